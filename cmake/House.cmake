@@ -1,0 +1,83 @@
+# The house rules of the build, set once: instruction set, warnings, sanitizers, and the three ways to declare a target.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Release, Debug or RelWithDebInfo" FORCE)
+endif()
+
+# One instruction set for every translation unit: Eigen's alignment depends on it.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  set(DBR_ARCH "x86-64-v3" CACHE STRING "Value of -march for the whole build (native for this machine alone)")
+else()
+  set(DBR_ARCH "" CACHE STRING "Value of -march for the whole build")
+endif()
+option(DBR_WERROR "Treat warnings as errors" OFF)
+option(DBR_TESTS "Build the tests" ON)
+option(DBR_BENCH "Build the benchmark program" ON)
+set(DBR_SANITIZE "" CACHE STRING "address;undefined or thread")
+
+find_program(CCACHE ccache)
+if(CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+endif()
+
+add_library(house_flags INTERFACE)
+target_include_directories(house_flags INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
+target_compile_definitions(house_flags INTERFACE EIGEN_USE_BLAS EIGEN_MPL2_ONLY)
+if(DBR_ARCH)
+  target_compile_options(house_flags INTERFACE -march=${DBR_ARCH})
+endif()
+foreach(sanitizer IN LISTS DBR_SANITIZE)
+  target_compile_options(house_flags INTERFACE -fsanitize=${sanitizer} -fno-omit-frame-pointer)
+  target_link_options(house_flags INTERFACE -fsanitize=${sanitizer})
+endforeach()
+
+add_library(house_warnings INTERFACE)
+target_compile_options(house_warnings INTERFACE -Wall -Wextra -Wno-sign-compare)
+if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+  target_compile_options(house_warnings INTERFACE -Wthread-safety)
+endif()
+if(DBR_WERROR)
+  target_compile_options(house_warnings INTERFACE -Werror)
+endif()
+
+# house_library(NAME SRCS a.cc b.cc DEPS public_libs... PRIVATE_DEPS libs...)
+function(house_library name)
+  cmake_parse_arguments(ARG "" "" "SRCS;DEPS;PRIVATE_DEPS" ${ARGN})
+  add_library(${name} STATIC ${ARG_SRCS})
+  target_link_libraries(${name} PUBLIC house_flags ${ARG_DEPS} PRIVATE house_warnings ${ARG_PRIVATE_DEPS})
+endfunction()
+
+# house_binary(NAME SRCS main.cc DEPS libs...): a program in build/bin.
+function(house_binary name)
+  cmake_parse_arguments(ARG "" "" "SRCS;DEPS" ${ARGN})
+  add_executable(${name} ${ARG_SRCS})
+  target_link_libraries(${name} PRIVATE house_flags house_warnings ${ARG_DEPS})
+endfunction()
+
+# house_test(NAME SRCS a_test.cc DEPS libs... LABELS slow TIMEOUT 60): a GoogleTest program that ctest runs as one test.
+# Reference data: DBR_REFERENCE_DIR in the environment, else tests/reference (compiled in as DBR_DEFAULT_REFERENCE_DIR).
+function(house_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SRCS;DEPS;LABELS" ${ARGN})
+  if(NOT DBR_TESTS)
+    return()
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  add_executable(${name} ${ARG_SRCS})
+  target_link_libraries(${name} PRIVATE house_flags house_warnings ${ARG_DEPS} GTest::gmock GTest::gtest GTest::gtest_main)
+  target_compile_definitions(${name} PRIVATE
+    DBR_DEFAULT_REFERENCE_DIR="${PROJECT_SOURCE_DIR}/tests/reference"
+    DBR_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}"
+    DBR_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}" ENVIRONMENT "OPENBLAS_NUM_THREADS=1")
+endfunction()

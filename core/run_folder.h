@@ -1,0 +1,27 @@
+// Where everything of a run lies in its folder.
+#pragma once
+
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/string_view.h"
+
+namespace dbr {
+
+struct RunFolder {
+  std::string root;
+
+  std::string config() const { return absl::StrCat(root, "/config.textproto"); }  // effective
+  std::string summary() const { return absl::StrCat(root, "/summary.json"); }
+  std::string metrics() const { return absl::StrCat(root, "/metrics.jsonl"); }
+  std::string checkpoints() const { return absl::StrCat(root, "/checkpoints"); }
+  std::string policies() const { return absl::StrCat(root, "/policy"); }
+  std::string latest_policy() const { return absl::StrCat(root, "/policy/latest.safetensors"); }
+  std::string logs() const { return absl::StrCat(root, "/logs"); }
+  std::string log(absl::string_view process) const { return absl::StrCat(root, "/logs/", process, ".log"); }
+  std::string replay_store() const { return absl::StrCat(root, "/replay.store"); }
+  std::string replay_address() const { return absl::StrCat("unix:", root, "/replay.sock"); }
+  std::string learner_address() const { return absl::StrCat("unix:", root, "/learner.sock"); }
+};
+
+}  // namespace dbr

@@ -1,0 +1,57 @@
+#include "core/shutdown.h"
+
+#include <poll.h>
+#include <signal.h>
+#include <sys/eventfd.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <utility>
+
+#include "core/check.h"
+
+namespace dbr {
+namespace {
+
+sigset_t ShutdownSignals() {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGINT);
+  sigaddset(&set, SIGTERM);
+  return set;
+}
+
+}  // namespace
+
+void BlockShutdownSignals() {
+  const sigset_t set = ShutdownSignals();
+  DBR_CHECK(pthread_sigmask(SIG_BLOCK, &set, nullptr) == 0);
+  signal(SIGPIPE, SIG_IGN);
+}
+
+ShutdownWatcher::ShutdownWatcher(std::function<void()> on_signal) {
+  const sigset_t set = ShutdownSignals();
+  signal_fd_ = signalfd(-1, &set, SFD_CLOEXEC);
+  stop_fd_ = eventfd(0, EFD_CLOEXEC);
+  DBR_CHECK(signal_fd_ >= 0 && stop_fd_ >= 0);
+  thread_ = std::thread([this, on_signal = std::move(on_signal)] {
+    for (;;) {
+      pollfd fds[2] = {{signal_fd_, POLLIN, 0}, {stop_fd_, POLLIN, 0}};
+      if (poll(fds, 2, -1) < 0) continue;
+      if (fds[1].revents != 0) return;
+      signalfd_siginfo info;
+      if (read(signal_fd_, &info, sizeof info) == sizeof info) on_signal();
+    }
+  });
+}
+
+ShutdownWatcher::~ShutdownWatcher() {
+  const std::uint64_t one = 1;
+  DBR_CHECK(write(stop_fd_, &one, sizeof one) == sizeof one);
+  thread_.join();
+  close(signal_fd_);
+  close(stop_fd_);
+}
+
+}  // namespace dbr

@@ -1,0 +1,59 @@
+// The interface of an environment, as a learning agent sees it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
+#include "absl/types/span.h"
+#include "core/space.h"
+
+namespace dbr {
+
+// What a step gave. `terminated`: the task ended, no future value. `truncated`: cut at the time limit, the future has value.
+struct StepResult {
+  float reward = 0;
+  bool terminated = false;
+  bool truncated = false;
+  float score = 0;  // with the end of an episode where the spec has a score: 1 win, 0.5 draw, 0 loss
+
+  bool done() const { return terminated || truncated; }
+};
+
+// One world. One thread at a time; the same seed and actions give the same episode. Not copyable.
+class Env {
+ public:
+  virtual ~Env() = default;
+
+  virtual const EnvSpec& spec() const = 0;
+
+  // Starts an episode. Writes the first observation [spec().observation_size] and legal-action mask
+  // [spec().actions.mask_width()] into the caller's memory.
+  virtual void Reset(std::uint64_t seed, absl::Span<float> observation, absl::Span<float> mask) = 0;
+
+  // Takes an action [spec().actions.width()], legal under the last mask (CHECKed), and writes the next observation and
+  // mask. After an end the observation is the final one and its mask may be all zeros; Reset comes next.
+  virtual StepResult Step(absl::Span<const float> action, absl::Span<float> observation, absl::Span<float> mask) = 0;
+};
+
+// What an environment is made with.
+struct EnvOptions {
+  std::string name;
+  std::vector<std::string> opponents;  // each episode draws one; empty: the environment's default. Only two-player games
+};
+
+// Makes an environment by its name or alias. InvalidArgument, naming the known names, for an unknown environment or
+// opponent, and for opponents given to an environment that has none.
+absl::StatusOr<std::unique_ptr<Env>> MakeEnv(const EnvOptions& options);
+
+// All names, sorted; the conformance suite walks them.
+std::vector<std::string> EnvNames();
+
+// Opponents against which an environment is evaluated by default, for example random, one_ply, mcts:10, mcts:100; empty
+// where it has none.
+std::vector<std::string> EvaluationOpponents(absl::string_view env_name);
+
+}  // namespace dbr

@@ -1,0 +1,155 @@
+#include "proto/codec.h"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "core/status_macros.h"
+
+namespace dbr {
+namespace {
+
+using Column = google::protobuf::RepeatedField<float>;
+
+absl::Status CheckColumn(const char* name, const Column& column, int count, int width) {
+  if (column.size() == static_cast<std::int64_t>(count) * width) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("column '", name, "': expected ", count, " rows of ", width,
+                                                 " values, found ", column.size(), " values"));
+}
+
+absl::Status CheckWidth(const char* name, int expected, std::uint32_t found) {
+  if (static_cast<std::uint32_t>(expected) == found) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(name, ": expected ", expected, ", found ", found,
+                                                 ". Writers and readers of one replay server share one environment."));
+}
+
+void Append(absl::Span<const float> values, Column* column) {
+  const int old_size = column->size();
+  column->Resize(old_size + static_cast<int>(values.size()), 0.0f);
+  std::copy(values.begin(), values.end(), column->mutable_data() + old_size);
+}
+
+template <class Matrix>
+void CopyColumn(const Column& column, Matrix* matrix) {
+  if (!column.empty()) std::memcpy(matrix->data(), column.data(), sizeof(float) * column.size());
+}
+
+}  // namespace
+
+TransitionLayout LayoutOf(const TransitionBatch& batch) {
+  return {static_cast<int>(batch.observation_width()), static_cast<int>(batch.action_width()),
+          static_cast<int>(batch.mask_width())};
+}
+
+void SetLayout(const TransitionLayout& layout, TransitionBatch* batch) {
+  batch->set_observation_width(layout.observation_width);
+  batch->set_action_width(layout.action_width);
+  batch->set_mask_width(layout.mask_width);
+}
+
+absl::Status CheckShape(const TransitionBatch& batch, const TransitionLayout& layout) {
+  RETURN_IF_ERROR(CheckWidth("observation_width", layout.observation_width, batch.observation_width()));
+  RETURN_IF_ERROR(CheckWidth("action_width", layout.action_width, batch.action_width()));
+  RETURN_IF_ERROR(CheckWidth("mask_width", layout.mask_width, batch.mask_width()));
+  constexpr std::uint32_t kMaxRows = 1u << 24;
+  if (batch.count() > kMaxRows) {
+    return absl::InvalidArgumentError(absl::StrCat("count: expected at most ", kMaxRows, ", found ", batch.count()));
+  }
+  const int n = static_cast<int>(batch.count());
+  RETURN_IF_ERROR(CheckColumn("observations", batch.observations(), n, layout.observation_width));
+  RETURN_IF_ERROR(CheckColumn("actions", batch.actions(), n, layout.action_width));
+  RETURN_IF_ERROR(CheckColumn("masks", batch.masks(), n, layout.mask_width));
+  RETURN_IF_ERROR(CheckColumn("rewards", batch.rewards(), n, 1));
+  RETURN_IF_ERROR(CheckColumn("discounts", batch.discounts(), n, 1));
+  RETURN_IF_ERROR(CheckColumn("next_observations", batch.next_observations(), n, layout.observation_width));
+  RETURN_IF_ERROR(CheckColumn("next_masks", batch.next_masks(), n, layout.mask_width));
+  if (!batch.advantages().empty()) RETURN_IF_ERROR(CheckColumn("advantages", batch.advantages(), n, 1));
+  if (!batch.critic_versions().empty() && batch.critic_versions_size() != n) {
+    return absl::InvalidArgumentError(absl::StrCat("column 'critic_versions': expected ", n, " values, found ",
+                                                   batch.critic_versions_size()));
+  }
+  return absl::OkStatus();
+}
+
+void AppendTransition(const TransitionView& transition, float advantage, std::uint64_t critic_version,
+                      TransitionBatch* batch) {
+  Append(transition.observation, batch->mutable_observations());
+  Append(transition.action, batch->mutable_actions());
+  Append(transition.mask, batch->mutable_masks());
+  batch->add_rewards(transition.reward);
+  batch->add_discounts(transition.discount);
+  Append(transition.next_observation, batch->mutable_next_observations());
+  Append(transition.next_mask, batch->mutable_next_masks());
+  batch->add_advantages(advantage);
+  batch->add_critic_versions(critic_version);
+  batch->set_count(batch->count() + 1);
+}
+
+TransitionView RowOf(const TransitionBatch& batch, int i) {
+  const std::size_t observation = batch.observation_width(), action = batch.action_width(), mask = batch.mask_width();
+  return {.observation = {batch.observations().data() + i * observation, observation},
+          .action = {batch.actions().data() + i * action, action},
+          .mask = {batch.masks().data() + i * mask, mask},
+          .reward = batch.rewards(i),
+          .discount = batch.discounts(i),
+          .next_observation = {batch.next_observations().data() + i * observation, observation},
+          .next_mask = {batch.next_masks().data() + i * mask, mask}};
+}
+
+absl::Status Decode(const TransitionBatch& batch, const TransitionLayout& layout, Batch* out) {
+  RETURN_IF_ERROR(CheckShape(batch, layout));
+  out->Resize(layout, batch.count(), /*with_keys=*/false);
+  CopyColumn(batch.observations(), &out->observations);
+  CopyColumn(batch.actions(), &out->actions);
+  CopyColumn(batch.masks(), &out->masks);
+  CopyColumn(batch.rewards(), &out->rewards);
+  CopyColumn(batch.discounts(), &out->discounts);
+  CopyColumn(batch.next_observations(), &out->next_observations);
+  CopyColumn(batch.next_masks(), &out->next_masks);
+  return absl::OkStatus();
+}
+
+PolicyMessage Encode(const PolicySnapshot& snapshot) {
+  PolicyMessage message;
+  message.set_version(snapshot.version);
+  message.set_updates(snapshot.updates);
+  message.set_env(snapshot.spec.env);
+  message.set_algorithm(snapshot.spec.algorithm);
+  message.set_observation_size(snapshot.spec.observation_size);
+  message.set_discrete(snapshot.spec.actions.discrete());
+  message.set_action_size(snapshot.spec.actions.size);
+  for (const int size : snapshot.spec.hidden_sizes) message.add_hidden_sizes(size);
+  for (const auto& [name, parameters] : snapshot.networks) {
+    NamedNetwork* network = message.add_networks();
+    network->set_name(name);
+    network->mutable_parameters()->Add(parameters.begin(), parameters.end());
+  }
+  message.set_crc32c(Checksum(snapshot));
+  message.set_support_epsilon(snapshot.support_epsilon);
+  return message;
+}
+
+absl::StatusOr<PolicySnapshot> Decode(const PolicyMessage& message) {
+  PolicySnapshot snapshot;
+  snapshot.version = message.version();
+  snapshot.updates = message.updates();
+  snapshot.spec.env = message.env();
+  snapshot.spec.algorithm = message.algorithm();
+  snapshot.spec.observation_size = static_cast<int>(message.observation_size());
+  snapshot.spec.actions = {message.discrete() ? ActionKind::kDiscrete : ActionKind::kContinuous,
+                           static_cast<int>(message.action_size())};
+  for (const auto size : message.hidden_sizes()) snapshot.spec.hidden_sizes.push_back(static_cast<int>(size));
+  snapshot.support_epsilon = message.support_epsilon();
+  for (const NamedNetwork& network : message.networks()) {
+    snapshot.networks.emplace_back(
+        network.name(), std::vector<float>(network.parameters().begin(), network.parameters().end()));
+  }
+  if (const std::uint32_t found = Checksum(snapshot); found != message.crc32c()) {
+    return absl::DataLossError(absl::StrCat("policy version ", message.version(), " is damaged: expected CRC-32C ",
+                                            absl::Hex(message.crc32c()), ", found ", absl::Hex(found)));
+  }
+  return snapshot;
+}
+
+}  // namespace dbr
