@@ -1,0 +1,77 @@
+#include "envs/connect4/env.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/check.h"
+#include "core/status_macros.h"
+
+namespace dbr::connect4 {
+namespace {
+
+// The column of an action, -1 if it is none.
+int ColumnOf(absl::Span<const float> action) {
+  DBR_CHECK(action.size() == 1);
+  const float column = action[0];
+  return column >= 0 && column < kColumns && column == std::floor(column) ? static_cast<int>(column) : -1;
+}
+
+// The last step of an episode; `outcome` is 1, 0 or -1 for the agent.
+StepResult LastStep(int outcome) {
+  StepResult result;
+  result.reward = static_cast<float>(outcome);
+  result.terminated = true;
+  result.score = 0.5f * static_cast<float>(outcome + 1);
+  return result;
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Env>> Connect4Env::Make(const std::vector<std::string>& names) {
+  std::vector<std::unique_ptr<Opponent>> opponents;
+  for (const std::string& name : names.empty() ? std::vector<std::string>{"random"} : names) {
+    ASSIGN_OR_RETURN(opponents.emplace_back(), MakeOpponent(name));
+  }
+  return std::unique_ptr<Env>(new Connect4Env(std::move(opponents)));
+}
+
+Connect4Env::Connect4Env(std::vector<std::unique_ptr<Opponent>> opponents)
+    : spec_{.name = "connect4",
+            .observation_size = kObservationSize,
+            .actions = {ActionKind::kDiscrete, kColumns},
+            .max_episode_steps = kCells / 2,
+            .has_score = true},
+      opponents_(std::move(opponents)) {}
+
+void Connect4Env::Reset(std::uint64_t seed, absl::Span<float> observation, absl::Span<float> mask) {
+  rng_ = Rng(seed);
+  opponent_ = opponents_[rng_.Below(static_cast<std::uint32_t>(opponents_.size()))].get();
+  board_ = Board();
+  running_ = true;
+  if (seed % 2 == 1) board_.Play(opponent_->ChooseColumn(board_, rng_));
+  WriteObservation(board_, observation, mask);
+}
+
+StepResult Connect4Env::Step(absl::Span<const float> action, absl::Span<float> observation,
+                             absl::Span<float> mask) {
+  DBR_CHECK(running_);  // Reset comes first, and again after each end
+  const int column = ColumnOf(action);
+  DBR_CHECK(board_.IsLegal(column));
+  board_.Play(column);
+  const bool ended_by_agent = board_.IsOver();
+  if (!ended_by_agent) board_.Play(opponent_->ChooseColumn(board_, rng_));
+  if (!board_.IsOver()) {
+    WriteObservation(board_, observation, mask);
+    return StepResult();
+  }
+  running_ = false;
+  DBR_CHECK(mask.size() == kColumns);
+  std::fill(mask.begin(), mask.end(), 0.0f);
+  const Cells own = ended_by_agent ? board_.other() : board_.mover();
+  WritePlanes(own, own ^ board_.occupied(), observation);
+  if (!board_.LastMoveWon()) return LastStep(0);
+  return LastStep(ended_by_agent ? 1 : -1);
+}
+
+}  // namespace dbr::connect4

@@ -1,0 +1,68 @@
+// The environments by name: one line each in the table. A plain table, for a registrar in a static archive
+// would be dropped by the linker.
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "envs/connect4/env.h"
+#include "envs/env.h"
+
+namespace dbr {
+namespace {
+
+struct Entry {
+  std::string name;
+  std::vector<std::string> aliases;
+  std::vector<std::string> evaluation_opponents;  // empty: a game of one, which takes no opponents
+  absl::StatusOr<std::unique_ptr<Env>> (*make)(const std::vector<std::string>& opponents);
+};
+
+const std::vector<Entry>& Entries() {
+  static const auto* const entries = new std::vector<Entry>{
+      {"connect4",
+       {"connect_four"},
+       {"random", "one_ply", "mcts:10", "mcts:100"},
+       connect4::Connect4Env::Make},
+  };
+  return *entries;
+}
+
+const Entry* Find(absl::string_view name) {
+  for (const Entry& entry : Entries()) {
+    if (name == entry.name || std::count(entry.aliases.begin(), entry.aliases.end(), name) > 0) return &entry;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Env>> MakeEnv(const EnvOptions& options) {
+  const Entry* const entry = Find(options.name);
+  if (entry == nullptr) {
+    return absl::InvalidArgumentError(absl::StrCat("unknown environment \"", options.name,
+                                                   "\"; expected one of: ", absl::StrJoin(EnvNames(), ", ")));
+  }
+  if (entry->evaluation_opponents.empty() && !options.opponents.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat("environment ", entry->name, " has no opponents, found \"",
+                                                   absl::StrJoin(options.opponents, "\", \""),
+                                                   "\"; leave the list of opponents empty"));
+  }
+  return entry->make(options.opponents);
+}
+
+std::vector<std::string> EnvNames() {
+  std::vector<std::string> names;
+  for (const Entry& entry : Entries()) names.push_back(entry.name);
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::vector<std::string> EvaluationOpponents(absl::string_view env_name) {
+  const Entry* const entry = Find(env_name);
+  return entry == nullptr ? std::vector<std::string>() : entry->evaluation_opponents;
+}
+
+}  // namespace dbr
