@@ -1,0 +1,223 @@
+#include "learner/algorithms/discrete_dbr.h"
+
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+
+namespace dbr {
+namespace {
+
+BatchNeeds NeedsOf(const AlgorithmConfig& config) {
+  const int batch = static_cast<int>(config.batch_size());
+  const int behavior = config.dbr().behavior_batch_size() > 0 ? static_cast<int>(config.dbr().behavior_batch_size()) : batch;
+  return {.uniform = batch, .plus = behavior, .minus = behavior};
+}
+
+PolicyLossOptions OptionsOf(const DbrConfig& config) {
+  return {.constraint = config.constraint(),
+          .divergence = config.divergence(),
+          .epsilon = config.epsilon(),
+          .mmd_sigma = config.mmd_sigma(),
+          .repel_negative = config.repel_negative(),
+          .normalize_q = config.normalize_q(),
+          .entropy_weight = config.entropy_weight(),
+          .use_q = config.warm_start_updates() == 0};
+}
+
+}  // namespace
+
+template <class Scalar>
+DiscreteDbr<Scalar>::DiscreteDbr(const AlgorithmSpec& spec)
+    : spec_(spec),
+      needs_(NeedsOf(spec.config)),
+      options_(OptionsOf(spec.config.dbr())),
+      init_rng_(spec.seed),
+      shape_(spec.observation_size, spec.hidden_sizes, spec.actions.size),
+      policy_(shape_, spec.config.learning_rate(), /*with_target=*/true, init_rng_),
+      critics_(shape_, spec.config.learning_rate(), init_rng_),
+      beta_plus_(shape_, spec.config.learning_rate(), /*with_target=*/false, init_rng_),
+      beta_minus_(shape_, spec.config.learning_rate(), /*with_target=*/false, init_rng_),
+      multiplier_(spec.config.dbr().first_multiplier(), spec.config.dbr().multiplier_learning_rate()),
+      metrics_{{"train/critic_loss"},        {"train/actor_loss"},       {"train/beta_plus_loss"},
+               {"train/beta_minus_loss"},    {"train/divergence_plus"},  {"train/divergence_minus"},
+               {"train/threshold"},          {"train/multiplier"},       {"train/policy_entropy"},
+               {"train/value_mean"},         {"train/target_mean"},      {"train/advantage_mean"},
+               {"train/advantage_positive"}, {"train/advantage_std"}} {}
+
+template <class Scalar>
+absl::Status DiscreteDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
+                                         const BasicBatch<Scalar>& minus) {
+  const Scalar loss_plus = FitBehavior(plus, &beta_plus_);
+  const Scalar loss_minus = FitBehavior(minus, &beta_minus_);
+  ComputeTargets(uniform);
+  const Scalar critic_loss = critics_.Fit(uniform.observations, uniform.actions, target_);
+  const PolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
+  ComputeAdvantages(uniform);
+  multiplier_.Step(policy_loss.divergence_plus - policy_loss.threshold);
+  critics_.UpdateTargets(spec_.config.target_tau());
+  policy_.UpdateTarget(spec_.config.target_tau());
+  ++updates_;
+  return Report(loss_plus, loss_minus, critic_loss, policy_loss, uniform);
+}
+
+template <class Scalar>
+Scalar DiscreteDbr<Scalar>::FitBehavior(const BasicBatch<Scalar>& batch, TrainedNetwork<Scalar>* behavior) {
+  if (batch.size() == 0) return 0;
+  MaskedSoftmax<Scalar>(behavior->Forward(batch.observations), batch.masks, &fitted_);
+  const Scalar loss = NegativeLogLikelihood<Scalar>(fitted_, batch.actions, &d_logits_);
+  behavior->Step(batch.observations, d_logits_);
+  return loss;
+}
+
+template <class Scalar>
+void DiscreteDbr<Scalar>::ComputeTargets(const BasicBatch<Scalar>& batch) {
+  MaskedSoftmax<Scalar>(policy_.ForwardTarget(batch.next_observations), batch.next_masks, &next_pi_);
+  const auto min_weight = static_cast<Scalar>(spec_.config.dbr().target_min_weight());
+  critics_.TargetValue(batch.next_observations, next_pi_, min_weight, &target_);
+  if (spec_.config.dbr().value_penalty()) {
+    MaskedSoftmax<Scalar>(beta_plus_.Forward(batch.next_observations), batch.next_masks, &fitted_);
+    Divergence<Scalar>(options_.divergence, static_cast<Scalar>(options_.mmd_sigma), next_pi_, fitted_, &penalty_, nullptr);
+    target_ -= multiplier_.value() * penalty_;
+  }
+  const auto scale = static_cast<Scalar>(spec_.config.reward_scale());
+  target_ = scale * batch.rewards + batch.discounts.cwiseProduct(target_);
+}
+
+template <class Scalar>
+PolicyLoss<Scalar> DiscreteDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
+  MaskedSoftmax<Scalar>(beta_plus_.Forward(batch.observations), batch.masks, &plus_);
+  MaskedSoftmax<Scalar>(beta_minus_.Forward(batch.observations), batch.masks, &minus_);
+  MaskedSoftmax<Scalar>(policy_.Forward(batch.observations), batch.masks, &pi_);
+  options_.use_q = updates_ >= spec_.config.dbr().warm_start_updates();
+  const PolicyLoss<Scalar> loss = DualBehaviorPolicyLoss<Scalar>(options_, pi_, critics_.q1(), critics_.q2(), plus_, minus_,
+                                                                 multiplier_.value(), &workspace_, &d_logits_);
+  policy_.Step(batch.observations, d_logits_);
+  return loss;
+}
+
+template <class Scalar>
+void DiscreteDbr<Scalar>::ComputeAdvantages(const BasicBatch<Scalar>& batch) {
+  advantages_.resize(static_cast<std::size_t>(batch.size()));
+  for (Eigen::Index j = 0; j < batch.size(); ++j) {
+    const auto a = static_cast<Eigen::Index>(batch.actions(0, j));
+    Scalar value = 0;
+    for (Eigen::Index k = 0; k < pi_.probabilities.rows(); ++k) {
+      value += pi_.probabilities(k, j) * std::min(critics_.q1()(k, j), critics_.q2()(k, j));
+    }
+    advantages_[static_cast<std::size_t>(j)] =
+        static_cast<float>(std::min(critics_.q1()(a, j), critics_.q2()(a, j)) - value);
+  }
+}
+
+template <class Scalar>
+absl::Status DiscreteDbr<Scalar>::Report(Scalar loss_plus, Scalar loss_minus, Scalar critic_loss,
+                                         const PolicyLoss<Scalar>& policy_loss, const BasicBatch<Scalar>& batch) {
+  const Eigen::Map<const Eigen::ArrayXf> advantages(advantages_.data(), static_cast<Eigen::Index>(advantages_.size()));
+  const double mean = advantages.mean();
+  const double values[] = {critic_loss,
+                           policy_loss.loss,
+                           loss_plus,
+                           loss_minus,
+                           policy_loss.divergence_plus,
+                           policy_loss.divergence_minus,
+                           policy_loss.threshold,
+                           multiplier_.value(),
+                           policy_loss.entropy,
+                           policy_loss.value,
+                           target_.mean(),
+                           mean,
+                           static_cast<double>((advantages >= 0).count()) / static_cast<double>(batch.size()),
+                           std::sqrt((advantages - static_cast<float>(mean)).square().mean())};
+  for (std::size_t i = 0; i < metrics_.size(); ++i) {
+    metrics_[i].value = values[i];
+    if (!std::isfinite(values[i])) {
+      return absl::InternalError(absl::StrCat("update ", updates_, ": ", metrics_[i].name,
+                                              " is not finite. Resume from the last checkpoint with a smaller learning_rate."));
+    }
+  }
+  return absl::OkStatus();
+}
+
+template <class Scalar>
+double DiscreteDbr<Scalar>::UpdateFlops() const {
+  const double n = needs_.uniform;
+  double flops = critics_.Flops(needs_.uniform);
+  for (const int behavior : {needs_.plus, needs_.minus}) {
+    flops += shape_.ForwardFlops(behavior) + shape_.ParameterGradientFlops(behavior);
+  }
+  flops += shape_.ForwardFlops(needs_.uniform) * (spec_.config.dbr().value_penalty() ? 2 : 1);  // at s'
+  flops += 3 * shape_.ForwardFlops(needs_.uniform) + shape_.ParameterGradientFlops(n);          // at s
+  return flops;
+}
+
+template <class Scalar>
+void DiscreteDbr<Scalar>::ExportPolicy(PolicySnapshot* snapshot) const {
+  snapshot->spec = {.env = spec_.env,
+                    .algorithm = "dbr",
+                    .observation_size = spec_.observation_size,
+                    .actions = spec_.actions,
+                    .hidden_sizes = spec_.hidden_sizes};
+  snapshot->support_epsilon = static_cast<float>(spec_.config.dbr().epsilon());
+  snapshot->networks.clear();
+  const auto add = [&](const char* name, const VectorX<Scalar>& parameters) {
+    snapshot->networks.emplace_back(name, std::vector<float>(parameters.begin(), parameters.end()));
+  };
+  add(kPolicyNetwork, policy_.parameters());
+  add(kCritic1, critics_.first().parameters());
+  add(kCritic2, critics_.second().parameters());
+  add(kBetaPlus, beta_plus_.parameters());
+  add(kBetaMinus, beta_minus_.parameters());
+}
+
+template <class Scalar>
+void DiscreteDbr<Scalar>::Save(TensorFile* file) const {
+  policy_.Save(kPolicyNetwork, file);
+  critics_.Save(file);
+  beta_plus_.Save(kBetaPlus, file);
+  beta_minus_.Save(kBetaMinus, file);
+  multiplier_.Save(file);
+  PutCounter("dbr.updates", updates_, file);
+}
+
+template <class Scalar>
+absl::Status DiscreteDbr<Scalar>::Load(const TensorFile& file) {
+  absl::Status status = policy_.Load(kPolicyNetwork, file);
+  status.Update(critics_.Load(file));
+  status.Update(beta_plus_.Load(kBetaPlus, file));
+  status.Update(beta_minus_.Load(kBetaMinus, file));
+  status.Update(multiplier_.Load(file));
+  status.Update(GetCounter("dbr.updates", file, &updates_));
+  return status;
+}
+
+template class DiscreteDbr<float>;
+template class DiscreteDbr<double>;
+
+namespace {
+
+// DiscreteDbr behind the interface.
+class DiscreteDbrAlgorithm final : public Algorithm {
+ public:
+  explicit DiscreteDbrAlgorithm(const AlgorithmSpec& spec) : dbr_(spec) {}
+  BatchNeeds needs() const override { return dbr_.needs(); }
+  absl::Status Update(const UpdateBatches& batches) override {
+    return dbr_.Update(batches.uniform, batches.plus, batches.minus);
+  }
+  absl::Span<const float> advantages() const override { return dbr_.advantages(); }
+  absl::Span<const UpdateMetric> metrics() const override { return dbr_.metrics(); }
+  double UpdateFlops() const override { return dbr_.UpdateFlops(); }
+  void ExportPolicy(PolicySnapshot* snapshot) const override { dbr_.ExportPolicy(snapshot); }
+  void Save(TensorFile* file) const override { dbr_.Save(file); }
+  absl::Status Load(const TensorFile& file) override { return dbr_.Load(file); }
+
+ private:
+  DiscreteDbr<float> dbr_;
+};
+
+}  // namespace
+
+std::unique_ptr<Algorithm> MakeDiscreteDbr(const AlgorithmSpec& spec) {
+  return std::make_unique<DiscreteDbrAlgorithm>(spec);
+}
+
+}  // namespace dbr

@@ -1,0 +1,51 @@
+// Adam (Kingma and Ba 2015) over one flat parameter vector.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "core/batch.h"
+
+namespace dbr {
+
+// No weight decay; bias-corrected as in the paper's algorithm 1. One thread at a time.
+template <class Scalar>
+class Adam {
+ public:
+  Adam() = default;
+  Adam(Eigen::Index size, double learning_rate)
+      : learning_rate_(learning_rate), first_(VectorX<Scalar>::Zero(size)), second_(VectorX<Scalar>::Zero(size)) {}
+
+  // parameters -= learning_rate * m^ / (sqrt(v^) + 1e-8), in one pass.
+  void Step(const VectorX<Scalar>& gradient, VectorX<Scalar>* parameters) {
+    constexpr double kBeta1 = 0.9, kBeta2 = 0.999, kEpsilon = 1e-8;
+    ++steps_;
+    const double t = static_cast<double>(steps_);
+    const auto step = static_cast<Scalar>(learning_rate_ / (1 - std::pow(kBeta1, t)));
+    const auto root_correction = static_cast<Scalar>(1 / std::sqrt(1 - std::pow(kBeta2, t)));
+    const auto b1 = static_cast<Scalar>(1 - kBeta1), b2 = static_cast<Scalar>(1 - kBeta2);
+    const auto epsilon = static_cast<Scalar>(kEpsilon);
+    const Scalar* __restrict g = gradient.data();
+    Scalar* __restrict m = first_.data();
+    Scalar* __restrict v = second_.data();
+    Scalar* __restrict p = parameters->data();
+    for (Eigen::Index i = 0, n = gradient.size(); i < n; ++i) {
+      m[i] += b1 * (g[i] - m[i]);
+      v[i] += b2 * (g[i] * g[i] - v[i]);
+      p[i] -= step * m[i] / (std::sqrt(v[i]) * root_correction + epsilon);
+    }
+  }
+
+  std::uint64_t steps() const { return steps_; }
+  void set_steps(std::uint64_t steps) { steps_ = steps; }
+  VectorX<Scalar>& first_moment() { return first_; }
+  VectorX<Scalar>& second_moment() { return second_; }
+
+ private:
+  double learning_rate_ = 0;
+  std::uint64_t steps_ = 0;
+  VectorX<Scalar> first_;
+  VectorX<Scalar> second_;
+};
+
+}  // namespace dbr
