@@ -93,12 +93,13 @@ class TextReader {
     std::string value;
     if (!ReadScalar(&value)) return false;
     std::string error;
-    if (text_expected && !text_found)
+    if (text_expected && !text_found) {
       error = absl::StrCat("expected text in quotes, found ", value);
-    else if (!text_expected && text_found)
-      error = absl::StrCat("expected no quotes, found \"", value, "\"");
-    else
-      error = SetFromText(value, field, message);
+    } else {
+      // Quotes where none belong stay in the text, which then is no value of the field's type.
+      error =
+          SetFromText(text_expected || !text_found ? value : absl::StrCat("\"", value, "\""), field, message);
+    }
     if (!error.empty()) NoteAt(first, path, error);
     return true;
   }
