@@ -1,0 +1,169 @@
+#include "actor/actor.h"
+
+#include <spdlog/spdlog.h>
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "core/rng.h"
+#include "core/status_macros.h"
+#include "proto/channel.h"
+#include "proto/grpc_status.h"
+
+namespace dbr {
+namespace {
+
+constexpr std::uint64_t kActorStream = 1 << 20;      // of the config's seed; the actor's index is added
+constexpr std::uint64_t kEvaluatorStream = 1 << 19;  // of the config's seed
+constexpr absl::Duration kStopCheck = absl::Milliseconds(100);
+constexpr absl::Duration kReportTimeout = absl::Seconds(5);
+
+Rng ActorRng(const ActorOptions& options) {
+  return Rng(options.config.seed()).Fork(kActorStream + options.index);
+}
+
+EnvOptions TrainingEnv(const Config& config) {
+  return {.name = config.env().name(),
+          .opponents = {config.env().opponents().begin(), config.env().opponents().end()}};
+}
+
+SubscriberOptions Subscription(const ActorOptions& options, const EnvSpec& env, std::string name,
+                               std::uint64_t seed) {
+  return {.address = options.learner_address,
+          .name = std::move(name),
+          .expected = ExpectedPolicy(env, options.config),
+          .seed = seed};
+}
+
+WriterOptions Writing(const ActorOptions& options, const EnvSpec& env) {
+  const ActorConfig& actor = options.config.actor();
+  WriterOptions writing;
+  writing.address = options.replay_address;
+  writing.name = absl::StrCat("actor-", options.index);
+  writing.layout = TransitionLayout::Of(env);
+  writing.batch_bytes = actor.batch_bytes();
+  writing.window = static_cast<int>(actor.window());
+  writing.buffered_transitions = actor.buffered_transitions();
+  return writing;
+}
+
+EvaluationLoopOptions Evaluating(const Config& config, const std::string& env) {
+  const EvaluationConfig& evaluation = config.evaluation();
+  return {
+      .opponents = OpponentsToEvaluate(env, {evaluation.opponents().begin(), evaluation.opponents().end()}),
+      .episodes = static_cast<int>(evaluation.episodes()),
+      .seed = Rng(config.seed()).Fork(kEvaluatorStream)() >> 32,
+      .mode = evaluation.mode(),
+      .threads = 1,
+      .every = absl::Seconds(evaluation.every_s())};
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Actor>> Actor::Create(const ActorOptions& options) {
+  ASSIGN_OR_RETURN(
+      std::unique_ptr<VectorEnv> envs,
+      VectorEnv::Create(TrainingEnv(options.config), static_cast<int>(options.config.actor().envs())));
+  return std::unique_ptr<Actor>(new Actor(options, std::move(envs)));
+}
+
+Actor::Actor(const ActorOptions& options, std::unique_ptr<VectorEnv> envs)
+    : options_(options),
+      envs_(std::move(envs)),
+      subscriber_(std::make_unique<PolicySubscriber>(
+          Subscription(options, envs_->spec(), absl::StrCat("actor-", options.index), ActorRng(options)()))),
+      writer_(std::make_unique<TransitionWriter>(Writing(options, envs_->spec()))) {}
+
+void Actor::Stop() {
+  stopping_ = true;
+  subscriber_->Close();
+}
+
+absl::Status Actor::Run() {
+  const absl::Status status = Act();
+  if (!stopping_) return status;
+  Drain();
+  return absl::OkStatus();
+}
+
+absl::Status Actor::Act() {
+  ASSIGN_OR_RETURN(const PolicySubscriber::PolicyPtr first,
+                   subscriber_->WaitForFirst(absl::InfiniteDuration()));
+  spdlog::info("acting in {} environments, from policy version {}", envs_->size(), first->snapshot().version);
+  const ActorConfig& actor = options_.config.actor();
+  const StepLoopOptions stepping = {.mode = actor.mode(),
+                                    .epsilon = actor.epsilon(),
+                                    .epsilon_ladder = actor.epsilon_ladder(),
+                                    .discount = options_.config.algorithm().discount()};
+  // An actor that starts again in the middle of a run must not play its first games once more.
+  const Rng rng = ActorRng(options_).Fork(first->snapshot().version);
+  StepLoop loop(std::move(envs_), stepping, rng,
+                [this](const TransitionView& transition, float advantage, std::uint64_t critic_version,
+                       const std::optional<EpisodeEnd>& end) {
+                  return Write(transition, advantage, critic_version, end);
+                });
+  while (!stopping_) {
+    ASSIGN_OR_RETURN(const PolicySubscriber::PolicyPtr policy, subscriber_->Current());
+    RETURN_IF_ERROR(loop.Step(*policy));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Actor::Write(const TransitionView& transition, float advantage, std::uint64_t critic_version,
+                          const std::optional<EpisodeEnd>& end) {
+  for (;;) {
+    const absl::Status status = writer_->Append(transition, advantage, critic_version, end, kStopCheck);
+    if (!absl::IsDeadlineExceeded(status)) return status;
+    if (stopping_) return absl::CancelledError("stopped while the replay server took no transitions");
+  }
+}
+
+void Actor::Drain() {
+  const absl::Status status = writer_->Flush(options_.drain_timeout);
+  const WriterCounters counters = writer_->counters();
+  writer_->Close();
+  if (status.ok()) {
+    spdlog::info("stopped; all {} transitions are with the replay server", counters.acknowledged);
+    return;
+  }
+  spdlog::warn("stopped; the replay server acknowledged {} of {} transitions: {}", counters.acknowledged,
+               counters.appended, std::string(status.message()));
+}
+
+absl::StatusOr<std::unique_ptr<EvaluatorProcess>> EvaluatorProcess::Create(const ActorOptions& options) {
+  EnvOptions env_options{.name = options.config.env().name(), .opponents = {}};
+  ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv(env_options));
+  for (const std::string& opponent : options.config.evaluation().opponents()) {
+    env_options.opponents = {opponent};
+    RETURN_IF_ERROR(MakeEnv(env_options).status());
+  }
+  return std::unique_ptr<EvaluatorProcess>(new EvaluatorProcess(options, env->spec()));
+}
+
+EvaluatorProcess::EvaluatorProcess(const ActorOptions& options, const EnvSpec& env)
+    : stub_(Policy::NewStub(MakeChannel(options.learner_address))),
+      subscriber_(
+          Subscription(options, env, "evaluator", Rng(options.config.seed()).Fork(kEvaluatorStream)())),
+      loop_(Evaluating(options.config, env.name),
+            {.newest_policy = [this] { return subscriber_.Current(); },
+             .report = [this](const EvaluationReport& report) { return Report(report); }}) {}
+
+absl::Status EvaluatorProcess::Run() {
+  return loop_.Run();
+}
+
+void EvaluatorProcess::Stop() {
+  loop_.Close();
+  subscriber_.Close();
+}
+
+absl::Status EvaluatorProcess::Report(const EvaluationReport& report) {
+  grpc::ClientContext context;
+  SetDeadline(kReportTimeout, &context);
+  EvaluationReportReply reply;
+  return FromGrpc(stub_->ReportEvaluation(&context, report, &reply));
+}
+
+}  // namespace dbr

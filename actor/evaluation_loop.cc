@@ -1,0 +1,107 @@
+#include "actor/evaluation_loop.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "core/status_macros.h"
+#include "envs/env.h"
+
+namespace dbr {
+namespace {
+
+EvaluationReport ReportOf(const EvaluationResult& result, const PolicySnapshot& snapshot) {
+  EvaluationReport report;
+  report.set_policy_version(snapshot.version);
+  report.set_updates(snapshot.updates);
+  report.set_env(result.env);
+  report.set_opponent(result.opponent);
+  report.set_episodes(result.episodes);
+  report.set_score_mean(result.score_mean);
+  report.set_score_stderr(result.score_stderr);
+  report.set_return_mean(result.return_mean);
+  report.set_return_stderr(result.return_stderr);
+  return report;
+}
+
+bool IsTransient(const absl::Status& status) {
+  return absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status) || absl::IsCancelled(status);
+}
+
+}  // namespace
+
+std::vector<std::string> OpponentsToEvaluate(const std::string& env,
+                                             const std::vector<std::string>& configured) {
+  std::vector<std::string> opponents = configured.empty() ? EvaluationOpponents(env) : configured;
+  if (opponents.empty()) opponents.emplace_back();
+  return opponents;
+}
+
+EvaluationLoop::EvaluationLoop(EvaluationLoopOptions options, EvaluationLoopPorts ports)
+    : options_(std::move(options)), ports_(std::move(ports)) {
+  if (ports_.wait_until) return;
+  ports_.wait_until = [this](absl::Time deadline) {
+    absl::MutexLock lock(&mutex_);
+    mutex_.AwaitWithDeadline(absl::Condition(&closed_), deadline);
+  };
+}
+
+void EvaluationLoop::Close() {
+  closing_ = true;
+  absl::MutexLock lock(&mutex_);
+  closed_ = true;
+}
+
+absl::Status EvaluationLoop::Run() {
+  absl::Time next = ports_.now();
+  while (!closing_) {
+    const absl::Status status = EvaluateIfNew();
+    if (closing_) break;
+    RETURN_IF_ERROR(status);
+    SendReports();
+    next = std::max(next + options_.every, ports_.now());
+    ports_.wait_until(next);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status EvaluationLoop::EvaluateIfNew() {
+  ASSIGN_OR_RETURN(std::shared_ptr<const PolicyNetworks> policy, ports_.newest_policy());
+  if (policy == nullptr) return absl::OkStatus();
+  const PolicySnapshot& snapshot = policy->snapshot();
+  if (evaluated_ != nullptr && snapshot.version == evaluated_->snapshot().version) return absl::OkStatus();
+  for (const std::string& opponent : options_.opponents) {
+    const EvaluationOptions evaluation = {.opponent = opponent,
+                                          .episodes = options_.episodes,
+                                          .seed = options_.seed + snapshot.version,
+                                          .mode = options_.mode,
+                                          .threads = options_.threads};
+    ASSIGN_OR_RETURN(const EvaluationResult result, Evaluate(*policy, evaluation, &closing_));
+    spdlog::info("policy version {} against {}: score {:.3f} +- {:.3f}, return {:.3f} +- {:.3f}",
+                 snapshot.version, opponent.empty() ? result.env : opponent, result.score_mean,
+                 result.score_stderr, result.return_mean, result.return_stderr);
+    unsent_.push_back(ReportOf(result, snapshot));
+    if (unsent_.size() > kMaxUnsent) unsent_.pop_front();
+    SendReports();
+  }
+  evaluated_ = std::move(policy);
+  return absl::OkStatus();
+}
+
+void EvaluationLoop::SendReports() {
+  while (!unsent_.empty() && !closing_) {
+    const absl::Status status = ports_.report(unsent_.front());
+    if (IsTransient(status)) {
+      if (std::exchange(said_loss_, true)) return;
+      spdlog::warn("no learner to take an evaluation: {}. Keeping it until there is one",
+                   std::string(status.message()));
+      return;
+    }
+    unsent_.pop_front();
+    if (std::exchange(said_loss_, false)) spdlog::info("the learner takes evaluations again");
+    if (!status.ok()) spdlog::error("the learner refuses an evaluation: {}", std::string(status.message()));
+  }
+}
+
+}  // namespace dbr

@@ -1,0 +1,54 @@
+// How well a policy plays: many whole episodes with figures that can be repeated.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "absl/types/span.h"
+#include "nn/policy.h"
+#include "proto/config.pb.h"
+
+namespace dbr {
+
+struct EvaluationOptions {
+  std::string opponent;  // empty where the environment has none
+  int episodes = 1000;
+  std::uint64_t seed = 1;
+  ActingMode mode = MODE;
+  int threads = 0;  // 0: one for each core. The result is the same for every number
+};
+
+struct EvaluationResult {
+  std::string env;
+  std::string opponent;
+  int episodes = 0;
+  std::uint64_t seed = 0;
+  double score_mean = 0;  // NaN, and its error too, where the environment has no score
+  double score_stderr = 0;
+  double return_mean = 0;  // of undiscounted sums of rewards
+  double return_stderr = 0;
+};
+
+// Plays exactly `episodes` episodes; episode k has the environment seed `seed * 2^20 + k`, so that a
+// two-player game starts with each side in turn, the agent first. Episodes run in groups of
+// kEvaluationColumns with one forward pass a step and one random stream a group: the result depends on the
+// policy, the seed and the mode alone, to the last bit on one kind of processor, and the first n episodes of
+// a longer evaluation are those of a shorter one. Blocks until all are played, or ends with Cancelled soon
+// after `cancelled` (may be null) becomes true. Other errors: InvalidArgument for an unknown environment or
+// opponent, a policy that does not fit it, a mode whose networks the policy lacks, or a number of episodes
+// outside [1, 2^20]; Internal for a policy that gives values not finite.
+inline constexpr int kEvaluationColumns = 64;
+absl::StatusOr<EvaluationResult> Evaluate(const PolicyNetworks& policy, const EvaluationOptions& options,
+                                          const std::atomic<bool>* cancelled = nullptr);
+
+// A mean and its standard error sqrt(sum (x - mean)^2 / (n - 1) / n): NaN for a single value, both NaN for
+// none.
+struct MeanEstimate {
+  double mean = 0;
+  double standard_error = 0;
+};
+MeanEstimate EstimateMean(absl::Span<const double> values);
+
+}  // namespace dbr

@@ -1,0 +1,91 @@
+// dbr-actor: acts and writes transitions, or with --evaluate plays evaluation episodes.
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "actor/actor.h"
+#include "core/run_folder.h"
+#include "core/shutdown.h"
+#include "nn/blas_threads.h"
+#include "proto/config_file.h"
+
+namespace dbr {
+namespace {
+
+struct Flags {
+  std::string config;
+  std::string run_dir;
+  int index = 0;
+  std::string replay;
+  std::string learner;
+  bool evaluate = false;
+};
+
+void Declare(CLI::App* app, Flags* flags) {
+  app->add_option("--config", flags->config, "Configuration (text format)")->required();
+  app->add_option("--run-dir", flags->run_dir, "Folder of the run")->required();
+  app->add_option("--index", flags->index, "Number of this actor among its like")->check(CLI::Range(0, 1023));
+  app->add_option("--replay", flags->replay,
+                  "Replay server (default: the config's, else the run folder's socket)");
+  app->add_option("--learner", flags->learner,
+                  "Learner (default: the config's, else the run folder's socket)");
+  app->add_flag("--evaluate", flags->evaluate, "Be the evaluator: play evaluation episodes, insert nothing");
+  app->footer("Example: dbr-actor --config deploy/configs/connect4.textproto --run-dir runs/first --index 0");
+}
+
+std::string FirstGiven(const std::string& flag, const std::string& configured, const std::string& standard) {
+  if (!flag.empty()) return flag;
+  return configured.empty() ? standard : configured;
+}
+
+int Fail(const absl::Status& status, int exit_code) {
+  spdlog::error("{}", std::string(status.message()));
+  return exit_code;
+}
+
+// Connects the shutdown signals to a process's Stop and runs it to its end; gives the exit code.
+template <class Process>
+int RunProcess(const absl::StatusOr<std::unique_ptr<Process>>& process) {
+  if (!process.ok()) return Fail(process.status(), absl::IsInvalidArgument(process.status()) ? 2 : 1);
+  const ShutdownWatcher watcher([&process] { (*process)->Stop(); });
+  const absl::Status status = (*process)->Run();
+  return status.ok() ? 0 : Fail(status, 1);
+}
+
+int Main(int argc, char** argv) {
+  Flags flags;
+  CLI::App app(
+      "Acts in many environments by the learner's newest policy and writes transitions to the replay "
+      "server.");
+  Declare(&app, &flags);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  const std::string name = flags.evaluate ? "evaluator" : absl::StrCat("actor-", flags.index);
+  spdlog::set_default_logger(spdlog::stderr_color_mt(name));
+
+  absl::StatusOr<Config> config = LoadConfig(flags.config);
+  if (!config.ok()) return Fail(config.status(), 2);
+  const RunFolder run{flags.run_dir};
+  const ActorOptions options = {
+      .config = *config,
+      .index = flags.index,
+      .replay_address = FirstGiven(flags.replay, config->replay().address(), run.replay_address()),
+      .learner_address = FirstGiven(flags.learner, config->learner().address(), run.learner_address())};
+  return flags.evaluate ? RunProcess(EvaluatorProcess::Create(options)) : RunProcess(Actor::Create(options));
+}
+
+}  // namespace
+}  // namespace dbr
+
+int main(int argc, char** argv) {
+  dbr::BlockShutdownSignals();
+  dbr::UseOneBlasThread();
+  return dbr::Main(argc, argv);
+}
