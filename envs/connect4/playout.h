@@ -14,13 +14,17 @@
 
 namespace dbr::connect4 {
 
-// The set bit of `bits` that has `n` set bits below it; requires n < popcount(bits).
+// The set bit of `bits` that has `n` set bits below it; requires n < popcount(bits). The loop serves machines
+// without BMI2.
+inline std::uint64_t NthSetBitByLoop(std::uint64_t bits, unsigned n) {
+  for (; n > 0; --n) bits &= bits - 1;
+  return bits & (~bits + 1);
+}
 inline std::uint64_t NthSetBit(std::uint64_t bits, unsigned n) {
 #ifdef __BMI2__
   return _pdep_u64(std::uint64_t{1} << n, bits);
 #else
-  for (; n > 0; --n) bits &= bits - 1;
-  return bits & (~bits + 1);
+  return NthSetBitByLoop(bits, n);
 #endif
 }
 

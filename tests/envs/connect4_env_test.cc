@@ -1,0 +1,125 @@
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "core/rng.h"
+#include "envs/connect4/board.h"
+#include "envs/connect4/env.h"
+#include "envs/env.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+namespace dbr::connect4 {
+namespace {
+
+using ::testing::Each;
+using ::testing::HasSubstr;
+
+// An environment with the memory that it writes into.
+struct World {
+  explicit World(std::vector<std::string> opponents) : env(Connect4Env::Make(opponents).value()) {}
+
+  void Reset(std::uint64_t seed) { env->Reset(seed, absl::MakeSpan(observation), absl::MakeSpan(mask)); }
+  StepResult Step(int column) {
+    const float action = static_cast<float>(column);
+    return env->Step(absl::MakeConstSpan(&action, 1), absl::MakeSpan(observation), absl::MakeSpan(mask));
+  }
+  int FirstLegal() const {
+    return static_cast<int>(std::find(mask.begin(), mask.end(), 1.0f) - mask.begin());
+  }
+
+  // The stones of a plane: 0 the agent's, 1 the opponent's.
+  Cells Stones(int plane) const {
+    Cells stones = 0;
+    for (int row = 0; row < kRows; ++row) {
+      for (int column = 0; column < kColumns; ++column) {
+        if (observation[kCells * plane + kColumns * row + column] == 1.0f) stones |= Cell(column, row);
+      }
+    }
+    return stones;
+  }
+
+  std::unique_ptr<Env> env;
+  std::array<float, kObservationSize> observation = {};
+  std::array<float, kColumns> mask = {};
+};
+
+TEST(Connect4Env, TheAgentStartsWithAnEvenSeedAndTheOpponentWithAnOddOne) {
+  World world({});
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    world.Reset(seed);
+    EXPECT_EQ(world.Stones(0), 0u);
+    EXPECT_EQ(std::popcount(world.Stones(1)), seed % 2 == 1 ? 1 : 0) << seed;
+    EXPECT_THAT(world.mask, Each(1.0f));
+  }
+}
+
+TEST(Connect4Env, AStepHoldsTheAgentsMoveAndTheReply) {
+  World world({});
+  world.Reset(0);
+  const StepResult result = world.Step(2);
+  EXPECT_FALSE(result.done());
+  EXPECT_EQ(result.reward, 0);
+  EXPECT_EQ(world.Stones(0), Cell(2, 0));
+  EXPECT_EQ(std::popcount(world.Stones(1)), 1);
+}
+
+TEST(Connect4Env, TheLastStepShowsTheFinalPositionAndItsOutcome) {
+  World world({"random", "one_ply", "mcts:10"});
+  std::array<int, 3> outcomes = {};  // lost, drawn, won
+  Rng rng(51);
+  for (std::uint64_t seed = 0; seed < 2000; ++seed) {
+    world.Reset(seed);
+    StepResult result;
+    while (!result.done()) {
+      int column = static_cast<int>(rng.Below(kColumns));
+      while (world.mask[column] == 0) column = (column + 1) % kColumns;
+      result = world.Step(column);
+    }
+    const bool won = HasFour(world.Stones(0));
+    const bool lost = HasFour(world.Stones(1));
+    ASSERT_FALSE(won && lost);
+    ASSERT_EQ(result.reward, won ? 1 : lost ? -1 : 0);
+    ASSERT_EQ(result.score, won ? 1 : lost ? 0 : 0.5f);
+    ASSERT_TRUE(result.terminated && !result.truncated);
+    ASSERT_TRUE(won || lost || (world.Stones(0) | world.Stones(1)) == kAllCells);
+    ASSERT_THAT(world.mask, Each(0.0f));
+    ++outcomes[static_cast<int>(result.reward) + 1];
+  }
+  EXPECT_THAT(outcomes, Each(testing::Gt(0)));
+}
+
+TEST(Connect4Env, DrawsAnOpponentForEachEpisode) {
+  World world({"random", "one_ply"});
+  std::array<int, 2> blocked = {};  // of three agent's stones in a column, by starting side
+  std::array<int, 2> threats = {};
+  for (std::uint64_t seed = 0; seed < 3000; ++seed) {
+    world.Reset(seed);
+    bool undisturbed = true;  // the column holds the agent's stones alone and the game goes on
+    for (int stone = 0; stone < 3 && undisturbed; ++stone) {
+      undisturbed = !world.Step(3).done();
+      if (stone < 2)
+        undisturbed = undisturbed && (world.Stones(1) & (Cells{0x3f} << (3 * kColumnStride))) == 0;
+    }
+    const bool three =
+        (world.Stones(0) & (Cell(3, 0) | Cell(3, 1) | Cell(3, 2))) == (Cell(3, 0) | Cell(3, 1) | Cell(3, 2));
+    if (!undisturbed || !three) continue;
+    ++threats[seed % 2];
+    blocked[seed % 2] += (world.Stones(1) & Cell(3, 3)) != 0;
+  }
+  for (const int side : {0, 1}) {  // one_ply blocks always, random with probability 1/7
+    EXPECT_GT(threats[side], 500);
+    EXPECT_NEAR(static_cast<double>(blocked[side]) / threats[side], 0.5 + 0.5 / 7, 0.08);
+  }
+}
+
+TEST(Connect4Env, UnknownOpponentsAreRefusedByName) {
+  const absl::Status status = Connect4Env::Make({"random", "grandmaster"}).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("grandmaster"));
+}
+
+}  // namespace
+}  // namespace dbr::connect4

@@ -1,0 +1,55 @@
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "envs/env.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+namespace dbr {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+TEST(EnvRegistry, NamesAreSortedAndCanBeMade) {
+  const std::vector<std::string> names = EnvNames();
+  EXPECT_TRUE(std::is_sorted(names.begin(), names.end()));
+  EXPECT_THAT(names, testing::Contains("connect4"));
+  for (const std::string& name : names) {
+    const auto env = MakeEnv({.name = name, .opponents = {}});
+    ASSERT_TRUE(env.ok()) << env.status();
+    EXPECT_EQ((*env)->spec().name, name);
+  }
+}
+
+TEST(EnvRegistry, AnAliasMakesTheSameEnvironment) {
+  const auto env = MakeEnv({.name = "connect_four", .opponents = {"one_ply"}});
+  ASSERT_TRUE(env.ok()) << env.status();
+  EXPECT_EQ((*env)->spec().name, "connect4");
+  EXPECT_EQ(EvaluationOpponents("connect_four"), EvaluationOpponents("connect4"));
+}
+
+TEST(EnvRegistry, AnUnknownNameIsAnsweredWithTheKnownOnes) {
+  const absl::Status status = MakeEnv({.name = "conect4", .opponents = {}}).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("\"conect4\""));
+  for (const std::string& name : EnvNames()) EXPECT_THAT(std::string(status.message()), HasSubstr(name));
+}
+
+TEST(EnvRegistry, AnUnknownOpponentIsAnsweredWithTheKnownOnes) {
+  const absl::Status status = MakeEnv({.name = "connect4", .opponents = {"random", "mcts"}}).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(status.message()),
+              AllOf(HasSubstr("\"mcts\""), HasSubstr("random, one_ply or mcts:N")));
+}
+
+TEST(EnvRegistry, EvaluationOpponentsCanBeMetAndUnknownNamesHaveNone) {
+  EXPECT_THAT(EvaluationOpponents("connect4"), ElementsAre("random", "one_ply", "mcts:10", "mcts:100"));
+  EXPECT_THAT(EvaluationOpponents("conect4"), IsEmpty());
+}
+
+}  // namespace
+}  // namespace dbr
