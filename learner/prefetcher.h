@@ -1,0 +1,60 @@
+// Batches drawn ahead of the updates.
+#pragma once
+
+#include <memory>
+#include <thread>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+#include "core/bounded_queue.h"
+#include "replay/client.h"
+
+namespace dbr {
+
+struct PrefetcherOptions {
+  DrawCounts counts;
+  TransitionLayout layout;
+  int depth = 2;                                         // batches ready ahead
+  absl::Duration call_timeout = absl::Seconds(5);        // of one Sample call; a call held that long is made again
+  absl::Duration retry_after = absl::Milliseconds(500);  // after a loss of the server
+};
+
+// Draws in a thread of its own until closed. A server that goes away, and its return, are said once each; batches that
+// the rate limiter holds back are waited for. A refusal (widths that differ) is final.
+class Prefetcher {
+ public:
+  // `client` outlives the prefetcher.
+  Prefetcher(ReplayClient* client, const PrefetcherOptions& options);
+  ~Prefetcher();  // Close() and join
+
+  // The next batch; blocks until there is one. Cancelled after Close, or the final error.
+  absl::StatusOr<std::unique_ptr<DrawnBatches>> Next();
+  // Gives a batch back, so that its memory is used again.
+  void Recycle(std::unique_ptr<DrawnBatches> batches);
+  // Share of Next() calls that had to wait.
+  double starved_share() const;
+
+  void Close();  // from any thread; wakes Next
+
+ private:
+  void Run();
+  // Whether to go on after a failed call; waits before the next attempt.
+  bool HandleFailure(const absl::Status& status, bool* away);
+  bool Closed() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return closed_; }
+
+  ReplayClient* const client_;
+  const PrefetcherOptions options_;
+  BoundedQueue<std::unique_ptr<DrawnBatches>> ready_;
+  BoundedQueue<std::unique_ptr<DrawnBatches>> free_;
+  mutable absl::Mutex mutex_;
+  bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+  absl::Status final_ ABSL_GUARDED_BY(mutex_);
+  std::uint64_t asked_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::uint64_t waited_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::thread thread_;
+};
+
+}  // namespace dbr

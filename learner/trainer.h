@@ -1,0 +1,66 @@
+// The learner's main loop: draw, update, write advantages back, push the policy, save.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+#include "core/run_folder.h"
+#include "learner/algorithm.h"
+#include "learner/metrics_sink.h"
+#include "learner/policy_service.h"
+#include "learner/prefetcher.h"
+#include "learner/relabeller.h"
+#include "learner/saver.h"
+#include "proto/config.pb.h"
+
+namespace dbr {
+
+struct TrainerParts {
+  std::unique_ptr<Algorithm> algorithm;
+  PolicyService* policy_service = nullptr;  // outlives the trainer, as the two below
+  MetricsSink* metrics = nullptr;
+  Saver* saver = nullptr;
+  std::unique_ptr<Prefetcher> prefetcher;
+  std::unique_ptr<Relabeller> relabeller;
+};
+
+// Run() in one thread; Stop() from any.
+class Trainer {
+ public:
+  Trainer(const LearnerConfig& config, TrainerParts parts);
+
+  // Continues from a checkpoint that Save() made.
+  absl::Status Load(const TensorFile& file);
+
+  // Publishes the first policy, then updates until stopped, an error, or max_updates; saves at the end. After max_updates
+  // it goes on serving until Stop. OK after Stop.
+  absl::Status Run();
+  void Stop();
+
+  std::uint64_t updates() const { return updates_; }
+
+ private:
+  absl::Status UpdateOnce();
+  void Publish();
+  void Record();
+  void MaybeCheckpoint();
+  Checkpoint MakeCheckpoint();
+  void SetStatus(bool finished);
+
+  const LearnerConfig config_;
+  TrainerParts parts_;
+  PolicySnapshot snapshot_;
+  std::uint64_t updates_ = 0;
+  std::uint64_t updates_at_record_ = 0;
+  double updates_per_second_ = 0;
+  absl::Time last_record_;
+  absl::Time last_checkpoint_;
+  absl::Mutex mutex_;
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
+};
+
+}  // namespace dbr
