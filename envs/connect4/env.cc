@@ -48,16 +48,15 @@ void Connect4Env::Reset(std::uint64_t seed, absl::Span<float> observation, absl:
   rng_ = Rng(seed);
   opponent_ = opponents_[rng_.Below(static_cast<std::uint32_t>(opponents_.size()))].get();
   board_ = Board();
-  running_ = true;
   if (seed % 2 == 1) board_.Play(opponent_->ChooseColumn(board_, rng_));
   WriteObservation(board_, observation, mask);
 }
 
 StepResult Connect4Env::Step(absl::Span<const float> action, absl::Span<float> observation,
                              absl::Span<float> mask) {
-  DBR_CHECK(running_);  // Reset comes first, and again after each end
+  DBR_CHECK(opponent_ != nullptr);  // Reset comes first
   const int column = ColumnOf(action);
-  DBR_CHECK(board_.IsLegal(column));
+  DBR_CHECK(board_.IsLegal(column));  // nothing is, once the episode has ended
   board_.Play(column);
   const bool ended_by_agent = board_.IsOver();
   if (!ended_by_agent) board_.Play(opponent_->ChooseColumn(board_, rng_));
@@ -65,7 +64,6 @@ StepResult Connect4Env::Step(absl::Span<const float> action, absl::Span<float> o
     WriteObservation(board_, observation, mask);
     return StepResult();
   }
-  running_ = false;
   DBR_CHECK(mask.size() == kColumns);
   std::fill(mask.begin(), mask.end(), 0.0f);
   const Cells own = ended_by_agent ? board_.other() : board_.mover();

@@ -36,10 +36,9 @@ class Connect4Env : public Env {
 
   const EnvSpec spec_;
   const std::vector<std::unique_ptr<Opponent>> opponents_;
-  Opponent* opponent_ = nullptr;  // of this episode
+  Opponent* opponent_ = nullptr;  // of this episode; null before the first
   Rng rng_{0};
   Board board_;
-  bool running_ = false;
 };
 
 }  // namespace dbr::connect4

@@ -16,7 +16,7 @@ constexpr float kExploration = 2.0f;  // c of UCT
 }  // namespace
 
 TreeSearch::TreeSearch(int simulations)
-    : simulations_(simulations), exploration_(simulations + 1), inverse_root_(simulations + 1) {
+    : simulations_(simulations), exploration_(simulations + 1), inverse_root_(simulations + 1), nodes_(1) {
   DBR_CHECK(simulations >= 1 && simulations <= kMaxSimulations);
   for (int n = 1; n <= simulations; ++n) {
     exploration_[n] = kExploration * std::sqrt(std::log(static_cast<float>(n)));
@@ -31,6 +31,14 @@ int TreeSearch::ChooseColumn(const Board& board, Rng& rng) {
   for (int i = 0; i < simulations_ && nodes_[0].proven == kUnproven; ++i) Simulate(board, choices);
   if (nodes_[0].children == 0) Expand(0, board, choices);  // a single simulation knows no child
   return nodes_[ChildToPlay()].landing_bit / kColumnStride;
+}
+
+int TreeSearch::Visits(int column) const {
+  const Node& root = nodes_.front();
+  for (std::int32_t i = root.first_child; i < root.first_child + root.children; ++i) {
+    if (nodes_[i].landing_bit / kColumnStride == column) return nodes_[i].visits;
+  }
+  return 0;
 }
 
 void TreeSearch::Simulate(Board board, ChoiceStream& choices) {

@@ -42,6 +42,9 @@ class TreeSearch {
   // The column to play. Requires a game that is not over.
   int ChooseColumn(const Board& board, Rng& rng);
 
+  // How the last search spread its simulations: the walks that went into a column from the root.
+  int Visits(int column) const;
+
  private:
   static constexpr std::int8_t kUnproven = 2;
 
