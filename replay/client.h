@@ -1,12 +1,12 @@
 // Typed calls to the replay server for everything but inserting (replay/writer.h).
 #pragma once
 
+#include <grpcpp/grpcpp.h>
+
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
-
-#include <grpcpp/grpcpp.h>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -32,13 +32,14 @@ struct DrawnBatches {
   std::uint64_t inserted = 0, episodes = 0;
 };
 
-// Thread-safe; calls block until their timeout. Errors carry the server's message: Unavailable where there is none,
-// DeadlineExceeded where the rate limiter held the call (its counters and bounds are in the message).
+// Thread-safe; calls block until their timeout. Errors carry the server's message: Unavailable where there is
+// none, DeadlineExceeded where the rate limiter held the call (its counters and bounds are in the message).
 class ReplayClient {
  public:
   explicit ReplayClient(const std::string& address);
 
-  absl::Status Sample(const DrawCounts& counts, const TransitionLayout& layout, absl::Duration timeout, DrawnBatches* out);
+  absl::Status Sample(const DrawCounts& counts, const TransitionLayout& layout, absl::Duration timeout,
+                      DrawnBatches* out);
   absl::StatusOr<RelabelReply> Relabel(std::uint64_t critic_version, absl::Span<const std::uint64_t> keys,
                                        absl::Span<const float> advantages, absl::Duration timeout);
   absl::StatusOr<StatsReply> Stats(absl::Duration timeout);

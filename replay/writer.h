@@ -15,35 +15,37 @@ namespace dbr {
 
 struct WriterOptions {
   std::string address;
-  std::string name;               // for people: "actor-0"
+  std::string name;  // for people: "actor-0"
   TransitionSource source = ONLINE;
   TransitionLayout layout;
-  std::size_t batch_bytes = 32 << 10;        // of one message
-  int window = 16;                           // unacknowledged messages under way
-  std::size_t buffered_transitions = 20000;  // not yet acknowledged; Append blocks past that
+  std::size_t batch_bytes = 32 << 10;                      // of one message
+  int window = 16;                                         // unacknowledged messages under way
+  std::size_t buffered_transitions = 20000;                // not yet acknowledged; Append blocks past that
   absl::Duration max_batch_age = absl::Milliseconds(100);  // a message is sent at the latest after this
 };
 
 struct WriterCounters {
   std::uint64_t appended = 0;
   std::uint64_t acknowledged = 0;
-  std::uint64_t refused = 0;     // non-finite, dropped by the server
+  std::uint64_t refused = 0;  // non-finite, dropped by the server
   std::uint64_t reconnects = 0;
 };
 
-// Append from one thread; a thread of its own sends. Every transition gets the next sequence number of a writer id drawn
-// at the start; after a broken stream all that is not acknowledged is sent again and the server drops what it holds
-// already. A loss of the server is logged once, and its return; retries back off with jitter up to 2 s.
+// Append from one thread; a thread of its own sends. Every transition gets the next sequence number of a
+// writer id drawn at the start; after a broken stream all that is not acknowledged is sent again and the
+// server drops what it holds already. A loss of the server is logged once, and its return; retries back off
+// with jitter up to 2 s.
 class TransitionWriter {
  public:
   explicit TransitionWriter(WriterOptions options);
   ~TransitionWriter();  // Close(), dropping what is not acknowledged
 
-  // Blocks while the buffer is full (the rate limiter holds inserts, or the server is away). Cancelled after Close;
-  // DeadlineExceeded after `timeout`; InvalidArgument where widths differ from the layout or the server refuses the
-  // layout (final: every later call answers the same).
+  // Blocks while the buffer is full (the rate limiter holds inserts, or the server is away). Cancelled after
+  // Close; DeadlineExceeded after `timeout`; InvalidArgument where widths differ from the layout or the
+  // server refuses the layout (final: every later call answers the same).
   absl::Status Append(const TransitionView& transition, float advantage, std::uint64_t critic_version,
-                      const std::optional<EpisodeEnd>& end, absl::Duration timeout = absl::InfiniteDuration());
+                      const std::optional<EpisodeEnd>& end,
+                      absl::Duration timeout = absl::InfiniteDuration());
 
   // Waits until all that was appended is acknowledged. DeadlineExceeded, Cancelled, or the final error.
   absl::Status Flush(absl::Duration timeout);

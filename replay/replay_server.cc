@@ -1,0 +1,57 @@
+#include "replay/replay_server.h"
+
+#include <chrono>
+#include <utility>
+#include <vector>
+
+#include "core/status_macros.h"
+
+namespace dbr {
+
+ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& layout) {
+  const ReplayConfig& replay = config.replay();
+  ReplayServerOptions options;
+  options.store.env = config.env().name();
+  options.store.layout = layout;
+  options.store.capacity = replay.capacity();
+  options.store.byte_budget = replay.byte_budget();
+  options.buffer.limiter.samples_per_insert = replay.samples_per_insert();
+  options.buffer.limiter.tolerance =
+      replay.tolerance() > 0 ? replay.tolerance()
+                             : 0.1 * static_cast<double>(replay.capacity()) * replay.samples_per_insert();
+  options.buffer.limiter.min_size = replay.min_size();
+  options.buffer.cumulative_advantage = replay.cumulative_advantage();
+  options.buffer.seed = config.seed();
+  options.server.address = replay.address();
+  options.server.allow_insecure = replay.allow_insecure();
+  return options;
+}
+
+absl::StatusOr<std::unique_ptr<ReplayServer>> ReplayServer::Start(const ReplayServerOptions& options) {
+  ASSIGN_OR_RETURN(std::unique_ptr<TransitionStore> store, TransitionStore::Open(options.store));
+  const std::uint64_t recovered = store->size(), torn = store->torn();
+  ASSIGN_OR_RETURN(std::unique_ptr<PartitionedBuffer> buffer,
+                   PartitionedBuffer::Make(std::move(store), options.buffer));
+  std::unique_ptr<ReplayServer> server(new ReplayServer(std::move(buffer)));
+  server->recovered_ = recovered;
+  server->torn_ = torn;
+  const std::vector<grpc::Service*> services = {&server->service_};
+  ASSIGN_OR_RETURN(server->running_, StartServer(options.server, services));
+  return server;
+}
+
+absl::Status ReplayServer::Stop() {
+  if (running_.server == nullptr) return absl::OkStatus();
+  buffer_->Close();
+  // Streams of inserts that are idle end only by this deadline.
+  running_.server->Shutdown(std::chrono::system_clock::now() + std::chrono::milliseconds(500));
+  running_.server->Wait();
+  running_.server.reset();
+  return buffer_->Sync();
+}
+
+ReplayServer::~ReplayServer() {
+  Stop().IgnoreError();
+}
+
+}  // namespace dbr

@@ -1,0 +1,119 @@
+// The rows of the replay: a ring of fixed stride that outlives its process where it lies in a file.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "core/transition.h"
+#include "replay/store_file.h"
+#include "replay/writer_table.h"
+
+namespace dbr {
+
+struct StoreOptions {
+  std::string path;  // empty: memory alone
+  std::string env;   // whose transitions these are
+  TransitionLayout layout;
+  std::uint64_t capacity = 0;      // rows
+  std::uint64_t byte_budget = 0;   // of all that a row needs, indices included; 0: what the capacity needs
+  bool resume = false;             // continue the file at `path`
+  std::uint64_t memory_bytes = 0;  // of the machine; 0: asks the system
+};
+
+// What a row carries beside its floats.
+struct RowLabels {
+  std::uint64_t sequence = 0;
+  std::uint64_t critic_version = 0;  // of the advantage
+  float advantage = kUnjudged;
+  std::uint32_t writer = 0;  // place in the table of writers
+  Source source = Source::kOnline;
+};
+
+// Counters that live as long as the store.
+struct StoreCounters {
+  std::uint64_t sampled;
+  std::uint64_t relabelled;
+  std::uint64_t relabel_evicted;
+  std::uint64_t relabel_stale;
+  std::uint64_t relabel_refused;
+  std::uint64_t refused;
+  std::uint64_t duplicates;
+  std::uint64_t newest_label;  // greatest critic version of a label
+  std::uint64_t episodes;
+};
+
+// Rows enter at the newest end and leave at the oldest. Each has a key, counted from 1 and never used again,
+// so that the slot of a key is arithmetic: the held keys are [oldest_key, next_key) and key k lies in slot k
+// % capacity.
+//
+// A row in a file is committed by its key, written last, after the old key was struck out: a row torn by a
+// kill has no key and is not there on reopening, and the one before it is the newest. Thread-compatible: the
+// buffer's lock guards it.
+class TransitionStore {
+ public:
+  static constexpr std::uint64_t kRecentEpisodes = 1000;
+
+  // Errors: InvalidArgument where capacity or budget make no sense or are larger than the machine's memory,
+  // and those of StoreFile::Open. O(capacity) with `resume`.
+  static absl::StatusOr<std::unique_ptr<TransitionStore>> Open(const StoreOptions& options);
+
+  // The oldest row is overwritten where the store is full: the caller must have called Evict. Returns the
+  // row's slot.
+  std::uint32_t Append(const TransitionView& transition, const RowLabels& labels);
+  void Evict();  // the oldest row; requires size() > 0
+
+  bool Holds(std::uint64_t key) const { return key >= oldest_key() && key < next_key_; }
+  std::uint32_t SlotOf(std::uint64_t key) const { return static_cast<std::uint32_t>(key % capacity_); }
+  std::uint64_t KeyAt(std::uint32_t slot) const { return metas_[slot].key; }
+  const RowLabels& labels(std::uint32_t slot) const { return metas_[slot].labels; }
+  void SetAdvantage(std::uint32_t slot, float advantage, std::uint64_t critic_version);
+  const float* row(std::uint32_t slot) const { return rows_ + std::size_t{slot} * stride_; }
+
+  void CountEpisode(const EpisodeEnd& end);
+  const EpisodeEnd& recent_episode(std::uint64_t i) const { return episodes_[i % kRecentEpisodes]; }
+
+  const TransitionLayout& layout() const { return layout_; }
+  std::uint64_t capacity() const { return capacity_; }
+  std::uint64_t size() const { return size_; }
+  std::uint64_t next_key() const { return next_key_; }
+  std::uint64_t oldest_key() const { return next_key_ - size_; }
+  std::uint64_t inserted() const { return next_key_ - 1; }
+  std::uint64_t bytes() const { return bytes_; }  // of rows, labels and indices, at capacity
+  std::uint64_t torn() const { return torn_; }    // rows that reopening found incomplete
+  StoreCounters& counters() { return *counters_; }
+  const StoreCounters& counters() const { return *counters_; }
+  WriterTable& writers() { return *writers_; }
+  const WriterTable& writers() const { return *writers_; }
+
+  // Writes all to disk, so that it outlives the machine too. Blocks.
+  absl::Status Sync() { return file_->Sync(); }
+
+ private:
+  struct Meta {
+    std::uint64_t key;  // 0: empty
+    RowLabels labels;
+  };
+
+  TransitionStore(const TransitionLayout& layout, std::uint64_t capacity, std::unique_ptr<StoreFile> file);
+  static std::size_t ContentBytes(std::uint64_t capacity, int stride);
+  void Recover();
+  bool LooksWhole(std::uint64_t key) const;
+
+  const TransitionLayout layout_;
+  const int stride_;  // floats
+  const std::uint64_t capacity_;
+  const std::uint64_t bytes_;
+  const std::unique_ptr<StoreFile> file_;
+  StoreCounters* counters_;
+  EpisodeEnd* episodes_;
+  Meta* metas_;
+  float* rows_;
+  std::unique_ptr<WriterTable> writers_;
+  std::uint64_t size_ = 0;
+  std::uint64_t next_key_ = 1;
+  std::uint64_t torn_ = 0;
+};
+
+}  // namespace dbr

@@ -1,0 +1,377 @@
+#include "replay/writer.h"
+
+#include <algorithm>
+#include <deque>
+#include <random>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/strings/str_cat.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
+#include "core/rng.h"
+#include "core/status_macros.h"
+#include "proto/channel.h"
+#include "proto/codec.h"
+#include "proto/grpc_status.h"
+#include "proto/replay.grpc.pb.h"
+#include "spdlog/spdlog.h"
+
+namespace dbr {
+namespace {
+
+constexpr absl::Duration kFirstBackoff = absl::Milliseconds(50);
+constexpr absl::Duration kLongestBackoff = absl::Seconds(2);
+
+std::uint64_t DrawId() {
+  std::random_device device;
+  return (std::uint64_t{device()} << 32 | device()) | 1;  // never 0
+}
+
+std::size_t RowsPerMessage(const WriterOptions& options) {
+  const std::size_t row_bytes = static_cast<std::size_t>(options.layout.stride() + 3) * sizeof(float);
+  const std::size_t rows = std::min(options.batch_bytes / row_bytes, options.buffered_transitions);
+  return std::max<std::size_t>(rows, 1);
+}
+
+absl::Status CheckWidth(const char* what, int expected, std::size_t found) {
+  if (static_cast<std::size_t>(expected) == found) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(what, ": expected ", expected, " values, found ", found));
+}
+
+absl::Status CheckWidths(const TransitionLayout& layout, const TransitionView& transition) {
+  RETURN_IF_ERROR(CheckWidth("observation", layout.observation_width, transition.observation.size()));
+  RETURN_IF_ERROR(CheckWidth("action", layout.action_width, transition.action.size()));
+  RETURN_IF_ERROR(CheckWidth("mask", layout.mask_width, transition.mask.size()));
+  RETURN_IF_ERROR(
+      CheckWidth("next_observation", layout.observation_width, transition.next_observation.size()));
+  return CheckWidth("next_mask", layout.mask_width, transition.next_mask.size());
+}
+
+// Errors that another try cannot mend.
+bool IsFinal(const absl::Status& status) {
+  return status.code() == absl::StatusCode::kInvalidArgument ||
+         status.code() == absl::StatusCode::kUnimplemented ||
+         status.code() == absl::StatusCode::kPermissionDenied;
+}
+
+std::uint64_t LastSequence(const InsertRequest& message) {
+  return message.first_sequence() + message.transitions().count() - 1;
+}
+
+}  // namespace
+
+// A message is filled by Append, sealed when it is full, old or waited for, sent, and dropped when it is
+// acknowledged:
+//   filling_  ->  sealed_[sent_ ...]  ->  sealed_[0 ... sent_)  ->  gone.
+// A broken stream sets sent_ back to 0. One thread connects and sends; while a stream lives a second one
+// reads replies.
+class TransitionWriter::Impl {
+ public:
+  explicit Impl(WriterOptions options)
+      : options_(std::move(options)),
+        id_(DrawId()),
+        rows_per_message_(RowsPerMessage(options_)),
+        messages_per_acknowledgement_(std::max(1, options_.window / 4)),
+        stub_(Replay::NewStub(MakeChannel(options_.address))),
+        jitter_(id_),
+        sender_([this] { Run(); }) {}
+
+  ~Impl() {
+    Close();
+    sender_.join();
+  }
+
+  absl::Status Append(const TransitionView& transition, float advantage, std::uint64_t critic_version,
+                      const std::optional<EpisodeEnd>& end, absl::Duration timeout) {
+    RETURN_IF_ERROR(CheckWidths(options_.layout, transition));
+    absl::MutexLock lock(&mutex_);
+    const auto has_room = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+      return Ended() || appended_ - acknowledged_ < options_.buffered_transitions;
+    };
+    RETURN_IF_ERROR(Await(has_room, timeout, "append: the buffer of this writer is full"));
+    AppendLocked(transition, advantage, critic_version, end);
+    return absl::OkStatus();
+  }
+
+  absl::Status Flush(absl::Duration timeout) {
+    absl::MutexLock lock(&mutex_);
+    const auto all_acknowledged = [this, target = appended_]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+      return Ended() || acknowledged_ >= target;
+    };
+    return Await(all_acknowledged, timeout, "flush: not all is acknowledged");
+  }
+
+  void Close() {
+    absl::MutexLock lock(&mutex_);
+    closed_ = true;
+    if (context_ != nullptr) context_->TryCancel();
+  }
+
+  std::uint64_t id() const { return id_; }
+
+  WriterCounters counters() const {
+    absl::MutexLock lock(&mutex_);
+    return {appended_, acknowledged_, refused_, reconnects_};
+  }
+
+ private:
+  using Stream = grpc::ClientReaderWriter<InsertRequest, InsertReply>;
+
+  bool Ended() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return closed_ || !final_error_.ok(); }
+
+  // Waits for `ready` as a caller for whom the sender hurries.
+  template <class Ready>
+  absl::Status Await(const Ready& ready, absl::Duration timeout, const char* what)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    if (!ready()) {
+      ++callers_waiting_;
+      mutex_.AwaitWithTimeout(absl::Condition(&ready), timeout);
+      --callers_waiting_;
+    }
+    if (!final_error_.ok()) return final_error_;
+    if (closed_) return absl::CancelledError("the writer is closed");
+    if (ready()) return absl::OkStatus();
+    return absl::DeadlineExceededError(absl::StrCat(what, " after ", absl::FormatDuration(timeout), ": ",
+                                                    appended_, " appended, ", acknowledged_,
+                                                    " acknowledged by ", options_.address));
+  }
+
+  void AppendLocked(const TransitionView& transition, float advantage, std::uint64_t critic_version,
+                    const std::optional<EpisodeEnd>& end) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    if (filling_ == nullptr) StartMessage();
+    ++appended_;
+    TransitionBatch* batch = filling_->mutable_transitions();
+    if (end.has_value()) {
+      EpisodeEndMessage* message = filling_->add_episode_ends();
+      message->set_row(batch->count());
+      message->set_return_(end->episode_return);
+      message->set_score(end->score);
+      message->set_length(static_cast<std::uint32_t>(end->length));
+    }
+    AppendTransition(transition, advantage, critic_version, batch);
+    if (batch->count() == rows_per_message_) Seal();
+  }
+
+  void StartMessage() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    if (spare_.empty()) {
+      filling_ = std::make_shared<InsertRequest>();
+    } else {
+      filling_ = std::move(spare_.back());
+      spare_.pop_back();
+      filling_->Clear();
+    }
+    filling_->set_first_sequence(appended_ + 1);
+    SetLayout(options_.layout, filling_->mutable_transitions());
+    filling_since_ = absl::Now();
+  }
+
+  void Seal() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { sealed_.push_back(std::move(filling_)); }
+
+  // The sender's side: what it may do now.
+  bool WindowOpen() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    return sent_ < static_cast<std::size_t>(options_.window);
+  }
+  bool CanSend() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    return WindowOpen() && sent_ < sealed_.size();
+  }
+  // A message that is not full is worth sending, or an acknowledgement worth asking for, once it is old or
+  // waited for.
+  absl::Time HurryTime() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    if (!WindowOpen() || sent_ < sealed_.size()) return absl::InfiniteFuture();
+    absl::Time since = absl::InfiniteFuture();
+    if (filling_ != nullptr) since = filling_since_;
+    if (sent_unasked_ > 0) since = std::min(since, last_sent_);
+    return callers_waiting_ > 0 && since != absl::InfiniteFuture() ? absl::InfinitePast()
+                                                                   : since + options_.max_batch_age;
+  }
+
+  // The next message to send, or null where the stream is to end.
+  std::shared_ptr<InsertRequest> NextMessage() ABSL_LOCKS_EXCLUDED(mutex_) {
+    absl::MutexLock lock(&mutex_);
+    for (;;) {
+      const absl::Time hurry_time = HurryTime();
+      const auto something_to_do = [this, hurry_time]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+        return closed_ || broken_ || CanSend() || HurryTime() < hurry_time;
+      };
+      mutex_.AwaitWithDeadline(absl::Condition(&something_to_do), hurry_time);
+      if (closed_ || broken_) return nullptr;
+      const bool hurry = !CanSend() && HurryTime() <= absl::Now();
+      if (hurry && filling_ == nullptr) return AcknowledgementRequest();
+      if (hurry) Seal();
+      if (CanSend()) return MarkSent(hurry);
+    }
+  }
+
+  std::shared_ptr<InsertRequest> AcknowledgementRequest() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    auto message = std::make_shared<InsertRequest>();
+    message->set_acknowledge(true);
+    sent_unasked_ = 0;
+    return message;
+  }
+
+  std::shared_ptr<InsertRequest> MarkSent(bool hurry) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    std::shared_ptr<InsertRequest> message = sealed_[sent_++];
+    last_sent_ = absl::Now();
+    ++sent_unasked_;
+    message->set_acknowledge(hurry || sent_unasked_ >= messages_per_acknowledgement_);
+    if (message->acknowledge()) sent_unasked_ = 0;
+    return message;
+  }
+
+  void TakeReply(const InsertReply& reply) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    acknowledged_ = std::max(acknowledged_, std::min(reply.acknowledged_sequence(), appended_));
+    refused_ = std::max(refused_, reply.refused());
+    while (!sealed_.empty() && LastSequence(*sealed_.front()) <= acknowledged_) {
+      // The sender may still be writing it.
+      if (sealed_.front().use_count() == 1) spare_.push_back(std::move(sealed_.front()));
+      sealed_.pop_front();
+      if (sent_ > 0) --sent_;
+    }
+  }
+
+  void ReadReplies(Stream* stream) ABSL_LOCKS_EXCLUDED(mutex_) {
+    InsertReply reply;
+    while (stream->Read(&reply)) {
+      absl::MutexLock lock(&mutex_);
+      TakeReply(reply);
+    }
+    absl::MutexLock lock(&mutex_);
+    broken_ = true;
+  }
+
+  // Sends the opening message and takes its answer; false where the stream is broken.
+  bool Open(Stream* stream) ABSL_LOCKS_EXCLUDED(mutex_) {
+    InsertRequest opening;
+    opening.set_writer_name(options_.name);
+    opening.set_writer_id(id_);
+    opening.set_source(options_.source);
+    InsertReply reply;
+    if (!stream->Write(opening) || !stream->Read(&reply)) return false;
+    std::uint64_t resend;
+    {
+      absl::MutexLock lock(&mutex_);
+      broken_ = false;
+      sent_ = 0;
+      sent_unasked_ = 0;
+      TakeReply(reply);
+      if (lost_) ++reconnects_;
+      resend = appended_ - acknowledged_;
+    }
+    if (std::exchange(lost_, false)) {
+      spdlog::info(
+          "{}: the replay server at {} is back; {} transitions are not acknowledged and are sent again",
+          options_.name, options_.address, resend);
+    }
+    return true;
+  }
+
+  // One stream from its opening to its end.
+  absl::Status RunStream() ABSL_LOCKS_EXCLUDED(mutex_) {
+    grpc::ClientContext context;
+    {
+      absl::MutexLock lock(&mutex_);
+      if (closed_) return absl::CancelledError("the writer is closed");
+      context_ = &context;
+    }
+    const auto stream = stub_->Insert(&context);
+    if (Open(stream.get())) {
+      failures_ = 0;
+      std::thread reader([this, &stream] { ReadReplies(stream.get()); });
+      while (const auto message = NextMessage()) {
+        if (!stream->Write(*message)) break;
+      }
+      reader.join();
+    }
+    const grpc::Status status = stream->Finish();
+    absl::MutexLock lock(&mutex_);
+    context_ = nullptr;
+    return FromGrpc(status);
+  }
+
+  void Run() ABSL_LOCKS_EXCLUDED(mutex_) {
+    for (;;) {
+      const absl::Status status = RunStream();
+      {
+        absl::MutexLock lock(&mutex_);
+        if (closed_) return;
+        if (IsFinal(status)) final_error_ = status;
+      }
+      if (IsFinal(status)) {
+        spdlog::error("{}: the replay server at {} refuses this writer: {}", options_.name, options_.address,
+                      status.ToString());
+        return;
+      }
+      if (!std::exchange(lost_, true)) {
+        spdlog::warn("{}: no stream to the replay server at {}: {}. Trying again until it is there.",
+                     options_.name, options_.address, status.ToString());
+      }
+      BackOff();
+    }
+  }
+
+  void BackOff() ABSL_LOCKS_EXCLUDED(mutex_) {
+    const absl::Duration longest =
+        std::min(kLongestBackoff, kFirstBackoff * (1 << std::min(failures_++, 10)));
+    const absl::Duration pause = longest * (0.5 + 0.5 * jitter_.Uniform());
+    absl::MutexLock lock(&mutex_);
+    mutex_.AwaitWithTimeout(absl::Condition(&closed_), pause);
+  }
+
+  const WriterOptions options_;
+  const std::uint64_t id_;
+  const std::size_t rows_per_message_;
+  const int messages_per_acknowledgement_;
+  const std::unique_ptr<Replay::Stub> stub_;
+
+  mutable absl::Mutex mutex_;
+  std::shared_ptr<InsertRequest> filling_ ABSL_GUARDED_BY(mutex_);
+  absl::Time filling_since_ ABSL_GUARDED_BY(mutex_);
+  std::deque<std::shared_ptr<InsertRequest>> sealed_ ABSL_GUARDED_BY(mutex_);  // not acknowledged, in order
+  std::vector<std::shared_ptr<InsertRequest>> spare_ ABSL_GUARDED_BY(mutex_);  // to be filled again
+  std::size_t sent_ ABSL_GUARDED_BY(mutex_) = 0;                               // of sealed_, on this stream
+  int sent_unasked_ ABSL_GUARDED_BY(mutex_) = 0;  // since the last that asks for an acknowledgement
+  absl::Time last_sent_ ABSL_GUARDED_BY(mutex_);
+  std::uint64_t appended_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::uint64_t acknowledged_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::uint64_t refused_ ABSL_GUARDED_BY(mutex_) = 0;
+  std::uint64_t reconnects_ ABSL_GUARDED_BY(mutex_) = 0;
+  int callers_waiting_ ABSL_GUARDED_BY(mutex_) = 0;
+  bool broken_ ABSL_GUARDED_BY(mutex_) = false;  // the stream has ended
+  bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+  absl::Status final_error_ ABSL_GUARDED_BY(mutex_);
+  grpc::ClientContext* context_ ABSL_GUARDED_BY(mutex_) = nullptr;  // of the stream under way
+
+  // Of the sending thread alone.
+  bool lost_ = false;
+  int failures_ = 0;
+  Rng jitter_;
+
+  std::thread sender_;
+};
+
+TransitionWriter::TransitionWriter(WriterOptions options)
+    : impl_(std::make_unique<Impl>(std::move(options))) {}
+TransitionWriter::~TransitionWriter() = default;
+
+absl::Status TransitionWriter::Append(const TransitionView& transition, float advantage,
+                                      std::uint64_t critic_version, const std::optional<EpisodeEnd>& end,
+                                      absl::Duration timeout) {
+  return impl_->Append(transition, advantage, critic_version, end, timeout);
+}
+absl::Status TransitionWriter::Flush(absl::Duration timeout) {
+  return impl_->Flush(timeout);
+}
+void TransitionWriter::Close() {
+  impl_->Close();
+}
+std::uint64_t TransitionWriter::id() const {
+  return impl_->id();
+}
+WriterCounters TransitionWriter::counters() const {
+  return impl_->counters();
+}
+
+}  // namespace dbr

@@ -1,0 +1,126 @@
+// Transitions that tests can recognise.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "core/transition.h"
+#include "replay/buffer_types.h"
+
+namespace dbr {
+
+inline constexpr TransitionLayout kSmallLayout{.observation_width = 4, .action_width = 1, .mask_width = 3};
+
+// Columns of transitions first, first + 1, ...: every value of transition i follows from i.
+class Rows {
+ public:
+  Rows(const TransitionLayout& layout, std::uint64_t first, int count, float advantage = kUnjudged) : layout_(layout) {
+    for (std::uint64_t i = first; i < first + static_cast<std::uint64_t>(count); ++i) Add(i, advantage);
+  }
+
+  // What transition i holds at its first observation, reward and next observation.
+  static float Value(std::uint64_t i) { return static_cast<float>(i % 100000); }
+
+  InsertColumns columns() const {
+    return {.count = static_cast<int>(rewards.size()),
+            .observations = observations.data(),
+            .actions = actions.data(),
+            .masks = masks.data(),
+            .rewards = rewards.data(),
+            .discounts = discounts.data(),
+            .next_observations = next_observations.data(),
+            .next_masks = next_masks.data(),
+            .advantages = advantages.data(),
+            .critic_versions = critic_versions.data()};
+  }
+
+  std::vector<float> observations, actions, masks, rewards, discounts, next_observations, next_masks, advantages;
+  std::vector<std::uint64_t> critic_versions;
+
+ private:
+  void Add(std::uint64_t i, float advantage) {
+    for (int k = 0; k < layout_.observation_width; ++k) {
+      observations.push_back(Value(i) + 0.125f * static_cast<float>(k % 8));
+      next_observations.push_back(-Value(i) - 0.125f * static_cast<float>(k % 8));
+    }
+    for (int k = 0; k < layout_.action_width; ++k) {
+      actions.push_back(layout_.mask_width > 0 ? static_cast<float>(i % layout_.mask_width) : 0.25f);
+    }
+    for (int k = 0; k < layout_.mask_width; ++k) {
+      masks.push_back(1);
+      next_masks.push_back(static_cast<float>(k % 2));
+    }
+    rewards.push_back(Value(i));
+    discounts.push_back(0.5f);
+    advantages.push_back(advantage);
+    critic_versions.push_back(0);
+  }
+
+  TransitionLayout layout_;
+};
+
+// Memory for a draw, and a check that each drawn row is one transition from end to end.
+class Drawn {
+ public:
+  Drawn(const TransitionLayout& layout, std::size_t count)
+      : keys(count),
+        observations(count * layout.observation_width),
+        actions(count * layout.action_width),
+        masks(count * layout.mask_width),
+        rewards(count),
+        discounts(count),
+        next_observations(count * layout.observation_width),
+        next_masks(count * layout.mask_width),
+        layout_(layout) {}
+
+  DrawColumns columns() {
+    return {.keys = keys.data(),
+            .observations = observations.data(),
+            .actions = actions.data(),
+            .masks = masks.data(),
+            .rewards = rewards.data(),
+            .discounts = discounts.data(),
+            .next_observations = next_observations.data(),
+            .next_masks = next_masks.data()};
+  }
+
+  void ExpectWhole(std::size_t count) const {
+    for (std::size_t i = 0; i < count; ++i) {
+      const Rows expected(layout_, static_cast<std::uint64_t>(rewards[i]), 1);
+      for (int k = 0; k < layout_.observation_width; ++k) {
+        ASSERT_EQ(observations[i * layout_.observation_width + k], expected.observations[k]);
+        ASSERT_EQ(next_observations[i * layout_.observation_width + k], expected.next_observations[k]);
+      }
+      for (int k = 0; k < layout_.action_width; ++k) {
+        ASSERT_EQ(actions[i * layout_.action_width + k], expected.actions[k]);
+      }
+      for (int k = 0; k < layout_.mask_width; ++k) {
+        ASSERT_EQ(masks[i * layout_.mask_width + k], expected.masks[k]);
+        ASSERT_EQ(next_masks[i * layout_.mask_width + k], expected.next_masks[k]);
+      }
+      ASSERT_EQ(discounts[i], 0.5f);
+    }
+  }
+
+  std::vector<std::uint64_t> keys;
+  std::vector<float> observations, actions, masks, rewards, discounts, next_observations, next_masks;
+
+ private:
+  TransitionLayout layout_;
+};
+
+// A folder of the test's own, removed with all that it holds.
+class TestFolder {
+ public:
+  TestFolder();
+  ~TestFolder();
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+}  // namespace dbr
