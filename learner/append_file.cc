@@ -35,8 +35,10 @@ absl::Status AppendFile::DropPartialLine() {
     return ErrnoStatus(errno, "cannot read the end of", path_);
   }
   const auto last = tail.rfind('\n');
-  size_ = last == std::string::npos ? begin : begin + static_cast<long>(last) + 1;
-  if (ftruncate(fd_, size_) != 0) return ErrnoStatus(errno, "cannot cut", path_);
+  const long end = last == std::string::npos ? begin : begin + static_cast<long>(last) + 1;
+  if (end == size_) return absl::OkStatus();
+  if (ftruncate(fd_, end) != 0) return ErrnoStatus(errno, "cannot cut", path_);
+  size_ = end;
   return absl::OkStatus();
 }
 

@@ -1,0 +1,72 @@
+#include "core/shutdown.h"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <memory>
+
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+
+namespace dbr {
+namespace {
+
+// Puts the signal mask back, so that other tests of the program can be interrupted.
+class ShutdownTest : public testing::Test {
+ protected:
+  ShutdownTest() {
+    pthread_sigmask(SIG_SETMASK, nullptr, &old_mask_);
+    BlockShutdownSignals();
+  }
+  ~ShutdownTest() override { pthread_sigmask(SIG_SETMASK, &old_mask_, nullptr); }
+
+  bool WaitForCount(int count) {
+    absl::MutexLock lock(&mutex_);
+    const auto reached = [&] { return count_ >= count; };
+    return mutex_.AwaitWithTimeout(absl::Condition(&reached), absl::Seconds(30));
+  }
+  std::unique_ptr<ShutdownWatcher> Watch() {
+    return std::make_unique<ShutdownWatcher>([this] {
+      absl::MutexLock lock(&mutex_);
+      ++count_;
+    });
+  }
+
+ private:
+  sigset_t old_mask_;
+  absl::Mutex mutex_;
+  int count_ = 0;
+};
+
+TEST_F(ShutdownTest, EachSignalCallsBack) {
+  const auto watcher = Watch();
+  kill(getpid(), SIGTERM);
+  EXPECT_TRUE(WaitForCount(1));
+  kill(getpid(), SIGINT);
+  EXPECT_TRUE(WaitForCount(2));
+  kill(getpid(), SIGTERM);
+  EXPECT_TRUE(WaitForCount(3));
+}
+
+TEST_F(ShutdownTest, EndsWithoutASignal) {
+  Watch().reset();
+}
+
+TEST_F(ShutdownTest, ASignalBeforeTheWatcherIsNotLost) {
+  kill(getpid(), SIGTERM);
+  const auto watcher = Watch();
+  EXPECT_TRUE(WaitForCount(1));
+}
+
+TEST_F(ShutdownTest, ABrokenPipeIsAnErrorOfTheWriteNotASignal) {
+  int ends[2];
+  ASSERT_EQ(pipe(ends), 0);
+  close(ends[0]);
+  EXPECT_EQ(write(ends[1], "x", 1), -1);
+  EXPECT_EQ(errno, EPIPE);
+  close(ends[1]);
+}
+
+}  // namespace
+}  // namespace dbr
