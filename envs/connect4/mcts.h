@@ -10,26 +10,25 @@
 
 namespace dbr::connect4 {
 
-// UCT with exact values where the search has reached the end of the game. This is the pinned meaning of
-// `mcts:N`:
-//  - N simulations a move, on a fresh tree. Each walks down from the root while the node has been visited
-//  before, and ends
-//    at the first unvisited node with one uniformly random playout. So the first simulation is the root's own
-//    playout, and the other N - 1 add one node each. A node gets its children when a walk passes it for the
-//    first time after its visit.
-//  - A walk goes to the child of the greatest  Q + 2 sqrt(ln(visits of the node) / visits of the child),  Q
-//  in [-1, 1]
-//    being the mean outcome for the side that moves into the child. An unvisited child comes before every
-//    visited one. The order of the children is shuffled when they are made and the first one wins a tie.
-//  - Terminal outcomes are exact: a node where the game is over is proven. So is a node with a child proven
-//  won for the
-//    side that moves there, and one whose children are all proven (it has the best of them). A proven child
-//    counts in the choice with its exact outcome alone; a walk that reaches a proven node ends there; a
-//    proven root ends the search.
-//  - The child played is the one of the greatest proven outcome (0 while unproven), then of the most visits,
-//  then of the
-//    greatest sum of outcomes, then the first in the shuffled order. So a proven win is always played and a
-//    proven loss is left alone where it can be.
+// UCT with exact values where the search has reached the end of the game. The pinned meaning of `mcts:N`:
+//
+// A simulation. Each move gets N of them on a fresh tree. A simulation walks down from the root while it
+// meets nodes that were visited before, and ends at the first unvisited one with one uniformly random
+// playout. So the first simulation is the root's own playout and the other N - 1 add one node each. A node
+// gets its children when a walk passes through it for the first time.
+//
+// The walk goes to the child of the greatest Q + 2 sqrt(ln(visits of the node) / visits of the child), where
+// Q in [-1, 1] is the mean outcome for the side that moves into the child. An unvisited child comes before
+// every visited one. The order of the children is shuffled when they are made, and the first one wins a tie.
+//
+// Terminal outcomes are exact: a node where the game is over is proven. So is a node with a child proven won
+// for the side that moves there, and one whose children are all proven (it has the best of them). A proven
+// child counts in the walk with its exact outcome alone, a walk that reaches a proven node ends there, and a
+// proven root ends the search.
+//
+// The child played is the one of the greatest proven outcome (0 while unproven), then of the most visits,
+// then of the greatest sum of outcomes, then the first in the shuffled order. So a proven win is always
+// played and a proven loss is left alone where it can be.
 //
 // Memory: about 7 nodes of 16 bytes a simulation, kept between moves. One thread at a time.
 class TreeSearch {

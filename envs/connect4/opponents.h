@@ -21,9 +21,14 @@ class Opponent {
 };
 
 // Makes a player by its name:
-//   random   a uniformly drawn legal column
-//   one_ply  a uniformly drawn column that wins at once; else one in which the other side would win at once;
-//   else random mcts:N   tree search with N simulations a move (mcts.h), N from 1 to 1,000,000
+//
+// `random`: a uniformly drawn legal column.
+//
+// `one_ply`: a uniformly drawn column that wins at once; else one that blocks a win of the other side; else
+// random.
+//
+// `mcts:N`: tree search (mcts.h) with N simulations a move, N from 1 to 1,000,000.
+//
 // InvalidArgument, naming these, for another name.
 absl::StatusOr<std::unique_ptr<Opponent>> MakeOpponent(absl::string_view name);
 
