@@ -3,13 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "core/rng.h"
 #include "nn/divergence.h"
 #include "nn/tanh_gaussian.h"
+#include "tests/numeric.h"
 #include "tests/reference_json.h"
 
 namespace dbr {
@@ -18,56 +18,6 @@ namespace {
 using Json = nlohmann::json;
 using Matrix = MatrixX<double>;
 using Vector = VectorX<double>;
-
-// Nested lists [n][dimensions] as [dimensions x n], or [n][samples][dimensions] as [dimensions x n *
-// samples].
-Matrix ToMatrix(const Json& rows) {
-  if (rows[0][0].is_array()) {
-    Json flat = Json::array();
-    for (const Json& group : rows) flat.insert(flat.end(), group.begin(), group.end());
-    return ToMatrix(flat);
-  }
-  Matrix matrix(rows[0].size(), rows.size());
-  for (std::size_t j = 0; j < rows.size(); ++j) {
-    for (std::size_t i = 0; i < rows[j].size(); ++i) matrix(i, j) = rows[j][i].get<double>();
-  }
-  return matrix;
-}
-
-Vector ToVector(const Json& values) {
-  Vector vector(values.size());
-  for (std::size_t i = 0; i < values.size(); ++i) vector[i] = values[i].get<double>();
-  return vector;
-}
-
-// `scale` is the tolerance relative to 1 + the largest entry.
-void ExpectNear(const Matrix& found, const Matrix& expected, double scale = 1e-10) {
-  ASSERT_EQ(found.rows(), expected.rows());
-  ASSERT_EQ(found.cols(), expected.cols());
-  EXPECT_TRUE(found.allFinite());
-  const double tolerance = scale * (1 + expected.cwiseAbs().maxCoeff());
-  EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), tolerance) << "found\n"
-                                                                 << found << "\nexpected\n"
-                                                                 << expected;
-}
-
-// Compares `gradient` with the central differences of `f` at `at`.
-void ExpectIsGradient(const Matrix& gradient, const std::function<double(const Matrix&)>& f,
-                      const Matrix& at) {
-  constexpr double kStep = 1e-6;
-  Matrix differences(at.rows(), at.cols());
-  Matrix moved = at;
-  for (Eigen::Index i = 0; i < at.size(); ++i) {
-    const double old = at.data()[i];
-    moved.data()[i] = old + kStep;
-    const double above = f(moved);
-    moved.data()[i] = old - kStep;
-    const double below = f(moved);
-    moved.data()[i] = old;
-    differences.data()[i] = (above - below) / (2 * kStep);
-  }
-  ExpectNear(gradient, differences, 1e-7);
-}
 
 Matrix Normals(Eigen::Index rows, Eigen::Index cols, Rng& rng) {
   return Matrix::NullaryExpr(rows, cols, [&] { return rng.Normal(); });

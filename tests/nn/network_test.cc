@@ -1,0 +1,279 @@
+// The MLP, Adam, the categorical policy and acting: against reference values of PyTorch in double, and against central
+// differences.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/rng.h"
+#include "nn/adam.h"
+#include "nn/categorical.h"
+#include "nn/mlp.h"
+#include "nn/policy.h"
+#include "tests/numeric.h"
+#include "tests/reference_json.h"
+
+namespace dbr {
+namespace {
+
+using Json = nlohmann::json;
+using Matrix = MatrixX<double>;
+using Vector = VectorX<double>;
+
+Matrix Uniform(Eigen::Index rows, Eigen::Index cols, Rng& rng) {
+  Matrix matrix(rows, cols);
+  for (double& value : matrix.reshaped()) value = 2 * rng.Uniform() - 1;
+  return matrix;
+}
+
+TEST(Mlp, AgreesWithTheReference) {
+  int cases = 0;
+  for (const ReferenceFile& file : ReferenceFiles("losses", "losses")) {
+    const Json& mlp = file.json["mlp"];
+    std::vector<int> sizes = {static_cast<int>(mlp["layers"][0]["weight"][0].size())};
+    for (const Json& layer : mlp["layers"]) sizes.push_back(static_cast<int>(layer["bias"].size()));
+    const MlpShape shape(sizes.front(), {sizes.begin() + 1, sizes.end() - 1}, sizes.back());
+    Vector parameters(shape.parameter_count()), expected_gradient(shape.parameter_count());
+    for (int i = 0; i < shape.layer_count(); ++i) {
+      const Json& layer = mlp["layers"][i];
+      const auto put = [&](const char* weight, const char* bias, Vector* flat) {
+        // ToMatrix turns [out][in] into [in x out].
+        const Matrix w = ToMatrix(layer[weight]).transpose();
+        flat->segment(shape.weight_offset(i), w.size()) = w.reshaped();
+        flat->segment(shape.bias_offset(i), shape.out(i)) = ToVector(layer[bias]);
+      };
+      put("weight", "bias", &parameters);
+      put("grad_weight", "grad_bias", &expected_gradient);
+    }
+    MlpActivations<double> activations;
+    const Matrix x = ToMatrix(mlp["x"]), dy = ToMatrix(mlp["dy"]);
+    ExpectNear(MlpForward<double>(shape, parameters.data(), x, &activations), ToMatrix(mlp["y"]));
+    Vector gradient;
+    MlpParameterGradient<double>(shape, parameters.data(), x, dy, &activations, &gradient);
+    ExpectNear(gradient, expected_gradient);
+    Matrix dx;
+    MlpInputGradient<double>(shape, parameters.data(), dy, &activations, &dx);
+    ExpectNear(dx, ToMatrix(mlp["grad_x"]));
+    ++cases;
+  }
+  EXPECT_GT(cases, 0);
+}
+
+class MlpDepth : public testing::TestWithParam<std::vector<int>> {};
+
+TEST_P(MlpDepth, GradientsAgreeWithDifferences) {
+  Rng rng(3);
+  const MlpShape shape(4, GetParam(), 3);
+  const Vector parameters = InitialParameters<double>(shape, rng);
+  const Matrix x = Uniform(4, 5, rng), dy = Uniform(3, 5, rng);
+  MlpActivations<double> activations;
+  const auto loss = [&](const double* p, const Matrix& input) {
+    MlpActivations<double> scratch;
+    return MlpForward<double>(shape, p, input, &scratch).cwiseProduct(dy).sum();
+  };
+  MlpForward<double>(shape, parameters.data(), x, &activations);
+  Vector gradient;
+  MlpParameterGradient<double>(shape, parameters.data(), x, dy, &activations, &gradient);
+  ExpectIsGradient(gradient, [&](const Matrix& p) { return loss(p.data(), x); }, parameters);
+  Matrix dx;
+  MlpInputGradient<double>(shape, parameters.data(), dy, &activations, &dx);
+  ExpectIsGradient(dx, [&](const Matrix& input) { return loss(parameters.data(), input); }, x);
+}
+
+INSTANTIATE_TEST_SUITE_P(Depths, MlpDepth,
+                         testing::Values(std::vector<int>{}, std::vector<int>{6}, std::vector<int>{5, 7, 6}));
+
+TEST(Mlp, CountsUsefulOperationsOfEachProductOnce) {
+  const MlpShape shape(84, {256, 256, 256}, 7);
+  const double products = 84 * 256 + 256 * 256 * 2 + 256 * 7;
+  EXPECT_EQ(shape.ForwardFlops(256), 2 * 256 * products);
+  EXPECT_EQ(shape.ParameterGradientFlops(256), 2 * 256 * (2 * products - 84 * 256));
+}
+
+TEST(Polyak, MovesTheTargetByTau) {
+  const Vector online = Vector::Constant(3, 2.0);
+  Vector target = Vector::Constant(3, 1.0);
+  PolyakUpdate<double>(online, 0.25, &target);
+  EXPECT_EQ(target, Vector::Constant(3, 1.25));
+}
+
+TEST(Adam, AgreesWithTheReference) {
+  int cases = 0;
+  for (const ReferenceFile& file : ReferenceFiles("losses", "losses")) {
+    Vector weights = ToVector(file.json["adam"]["start"]);
+    Adam<double> adam(weights.size(), 3e-4);
+    for (const Json& step : file.json["adam"]["steps"]) {
+      adam.Step(ToVector(step["grad"]), &weights);
+      ExpectNear(weights, ToVector(step["weights"]), 1e-12);
+      ++cases;
+    }
+  }
+  EXPECT_GT(cases, 0);
+}
+
+TEST(MaskedCategorical, AgreesWithTheReference) {
+  int cases = 0;
+  for (const ReferenceFile& file : ReferenceFiles("losses", "losses")) {
+    for (const Json& reference : file.json["masked_categorical"]["cases"]) {
+      Json legal = reference["legal"];
+      for (Json& row : legal) {
+        for (Json& entry : row) {
+          if (entry.is_boolean()) entry = entry.get<bool>() ? 1 : 0;
+        }
+      }
+      const Matrix mask = ToMatrix(legal);
+      Categorical<double> p, q;
+      MaskedSoftmax<double>(ToMatrix(reference["logits"]), mask, &p);
+      MaskedSoftmax<double>(ToMatrix(reference["other_logits"]), mask, &q);
+      ExpectNear(p.probabilities, ToMatrix(reference["probabilities"]));
+      Vector kl, entropy;
+      KlDivergence(p, q, &kl);
+      Entropy(p, &entropy);
+      ExpectNear(kl, ToVector(reference["kl"]));
+      ExpectNear(entropy, ToVector(reference["entropy"]));
+      Matrix gradient = p.log_probabilities - q.log_probabilities;
+      SoftmaxGradient(p, &gradient);
+      ExpectNear(gradient, ToMatrix(reference["grad_logits_of_kl_sum"]));
+      gradient = -p.log_probabilities;
+      SoftmaxGradient(p, &gradient);
+      ExpectNear(gradient, ToMatrix(reference["grad_logits_of_entropy_sum"]));
+      ++cases;
+    }
+  }
+  EXPECT_GT(cases, 0);
+}
+
+TEST(MaskedCategorical, LikelihoodGradientAgreesWithDifferences) {
+  Rng rng(5);
+  const Matrix logits = Uniform(4, 3, rng);
+  Matrix mask = Matrix::Ones(4, 3), actions(1, 3);
+  mask(2, 0) = mask(0, 1) = 0;
+  actions << 1, 3, 0;
+  Categorical<double> p;
+  MaskedSoftmax<double>(logits, mask, &p);
+  Matrix gradient;
+  NegativeLogLikelihood<double>(p, actions, &gradient);
+  EXPECT_EQ(gradient(2, 0), 0);
+  ExpectIsGradient(gradient,
+                   [&](const Matrix& z) {
+                     Categorical<double> moved;
+                     MaskedSoftmax<double>(z, mask, &moved);
+                     return NegativeLogLikelihood<double>(moved, actions, nullptr);
+                   },
+                   logits);
+}
+
+TEST(MaskedCategorical, AColumnWithoutLegalActionsIsZero) {
+  Categorical<double> p;
+  MaskedSoftmax<double>(Matrix::Ones(3, 1), Matrix::Zero(3, 1), &p);
+  EXPECT_TRUE(p.probabilities.isZero(0));
+  EXPECT_TRUE(p.log_probabilities.isZero(0));
+}
+
+TEST(MaskedCategorical, StaysFiniteForLargeLogits) {
+  Matrix logits(3, 1);
+  logits << 1e5, -1e5, 3e4;
+  Categorical<double> p;
+  MaskedSoftmax<double>(logits, Matrix::Ones(3, 1), &p);
+  EXPECT_TRUE(p.log_probabilities.allFinite());
+  EXPECT_DOUBLE_EQ(p.probabilities(0, 0), 1);
+}
+
+// A policy without hidden layers whose outputs are its biases.
+std::vector<float> Constant(const std::vector<float>& outputs) {
+  std::vector<float> parameters(outputs.size(), 0.0f);  // weights [out x 1]
+  parameters.insert(parameters.end(), outputs.begin(), outputs.end());
+  return parameters;
+}
+
+PolicySnapshot FourChoices() {
+  PolicySnapshot snapshot;
+  snapshot.version = 1;
+  snapshot.spec = {.env = "test", .algorithm = "dbr", .observation_size = 1, .actions = {ActionKind::kDiscrete, 4}, .hidden_sizes = {}};
+  const auto logs = [](std::vector<float> p) {
+    for (float& x : p) x = std::log(x);
+    return Constant(p);
+  };
+  snapshot.networks = {{kPolicyNetwork, logs({0.4f, 0.3f, 0.2f, 0.1f})},
+                       {kCritic1, Constant({0.1f, 0.2f, 0.6f, 0.9f})},
+                       {kCritic2, Constant({0.3f, 0.2f, 0.5f, 0.8f})},
+                       {kBetaPlus, logs({0.50f, 0.04f, 0.40f, 0.06f})},
+                       {kBetaMinus, logs({0.20f, 0.10f, 0.10f, 0.60f})}};
+  return snapshot;
+}
+
+class Acting : public testing::Test {
+ protected:
+  float Act(ActingMode mode, const std::vector<float>& mask) {
+    const auto policy = PolicyNetworks::Create(snapshot_);
+    EXPECT_TRUE(policy.ok()) << policy.status();
+    const MatrixX<float> observation = MatrixX<float>::Zero(1, 1);
+    const MatrixX<float> masks = Eigen::Map<const MatrixX<float>>(mask.data(), 4, 1);
+    MatrixX<float> action(1, 1);
+    status_ = runner_.Act(**policy, mode, observation, masks, rng_, action);
+    return action(0, 0);
+  }
+
+  PolicySnapshot snapshot_ = FourChoices();
+  PolicyRunner runner_;
+  Rng rng_{1};
+  absl::Status status_;
+};
+
+TEST_F(Acting, EachModeChoosesByItsOwnRule) {
+  EXPECT_EQ(Act(MODE, {1, 1, 1, 1}), 0);
+  EXPECT_EQ(Act(GREEDY_Q, {1, 1, 1, 1}), 3);
+  EXPECT_EQ(Act(SUPPORT, {1, 1, 1, 1}), 2);  // 3 has the greatest Q, but beta- is above beta+ there
+}
+
+TEST_F(Acting, MasksHoldInEachMode) {
+  EXPECT_EQ(Act(MODE, {0, 1, 1, 1}), 1);
+  EXPECT_EQ(Act(GREEDY_Q, {1, 1, 1, 0}), 2);
+  EXPECT_EQ(Act(SUPPORT, {0, 1, 0, 1}), 1);  // none is supported: the greatest ratio
+  for (int i = 0; i < 200; ++i) EXPECT_EQ(Act(SAMPLE, {0, 0, 1, 0}), 2);
+}
+
+TEST_F(Acting, SamplesByTheProbabilities) {
+  int counts[4] = {};
+  constexpr int kDraws = 20000;
+  for (int i = 0; i < kDraws; ++i) ++counts[static_cast<int>(Act(SAMPLE, {1, 1, 1, 0}))];
+  EXPECT_EQ(counts[3], 0);
+  EXPECT_NEAR(counts[0], kDraws * 4.0 / 9, 5 * std::sqrt(kDraws * 0.25));
+  EXPECT_NEAR(counts[2], kDraws * 2.0 / 9, 5 * std::sqrt(kDraws * 0.25));
+}
+
+TEST_F(Acting, AdvantageIsTheSmallerTwinLessItsMeanUnderThePolicy) {
+  Act(SAMPLE, {1, 1, 1, 1});
+  MatrixX<float> action(1, 1);
+  action << 2;
+  VectorX<float> advantage(1);
+  runner_.Advantages(action, advantage);
+  EXPECT_NEAR(advantage[0], 0.5 - (0.4 * 0.1 + 0.3 * 0.2 + 0.2 * 0.5 + 0.1 * 0.8), 1e-6);
+}
+
+TEST_F(Acting, AMissingNetworkIsNamed) {
+  snapshot_.networks.resize(1);
+  Act(GREEDY_Q, {1, 1, 1, 1});
+  EXPECT_THAT(std::string(status_.message()), testing::HasSubstr("critics"));
+  Act(SAMPLE, {1, 1, 1, 1});
+  EXPECT_TRUE(status_.ok());
+  VectorX<float> advantage(1);
+  runner_.Advantages(MatrixX<float>::Zero(1, 1), advantage);
+  EXPECT_TRUE(std::isnan(advantage[0]));
+}
+
+TEST_F(Acting, ANetworkOfAnotherSizeIsRefusedByName) {
+  snapshot_.networks[2].second.pop_back();
+  const auto policy = PolicyNetworks::Create(snapshot_);
+  EXPECT_THAT(std::string(policy.status().message()),
+              testing::AllOf(testing::HasSubstr("critic_2"), testing::HasSubstr("expected 8"), testing::HasSubstr("found 7")));
+}
+
+TEST_F(Acting, ValuesThatAreNotFiniteAreAnError) {
+  snapshot_.networks[1].second.back() = NAN;
+  Act(GREEDY_Q, {1, 1, 1, 1});
+  EXPECT_TRUE(absl::IsInternal(status_)) << status_;
+}
+
+}  // namespace
+}  // namespace dbr
