@@ -1,10 +1,9 @@
 // A batch of transitions for an update: one column for each sample.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "core/transition.h"
 
@@ -15,7 +14,8 @@ using MatrixX = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
 template <class Scalar>
 using VectorX = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
 
-// Plain values; the caller owns a batch and refills it, so that an update allocates nothing once sizes have settled.
+// Plain values; the caller owns a batch and refills it, so that an update allocates nothing once sizes have
+// settled.
 template <class Scalar>
 struct BasicBatch {
   MatrixX<Scalar> observations;       // [observation x n]

@@ -33,7 +33,8 @@ class BoundedQueue {
     items_.push_back(std::move(value));
     return true;
   }
-  // Blocks until an item comes, the queue is closed and empty, or `timeout` has passed; the latter two give nullopt.
+  // Blocks until an item comes, the queue is closed and empty, or `timeout` has passed; the latter two give
+  // nullopt.
   std::optional<T> Pop(absl::Duration timeout = absl::InfiniteDuration()) {
     absl::MutexLock lock(&mutex_);
     mutex_.AwaitWithTimeout(absl::Condition(this, &BoundedQueue::CanPop), timeout);

@@ -45,7 +45,8 @@ absl::Status ErrnoStatus(int error_number, absl::string_view what, absl::string_
     case ENOSPC:
     case EDQUOT:
     case EFBIG:
-      return absl::ResourceExhaustedError(absl::StrCat(message, ". Free some space or choose another folder."));
+      return absl::ResourceExhaustedError(
+          absl::StrCat(message, ". Free some space or choose another folder."));
     default:
       return absl::InternalError(message);
   }

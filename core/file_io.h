@@ -9,9 +9,9 @@
 
 namespace dbr {
 
-// Replaces `path` by `contents`: writes a temporary file beside it, fsync, rename, fsync of the folder. After a crash
-// the old or the new contents stand there, never a mixture. Errors name the path and say what the system said
-// (ResourceExhausted: disk full; PermissionDenied; NotFound: no such folder; Internal: others).
+// Replaces `path` by `contents`: writes a temporary file beside it, fsync, rename, fsync of the folder. After
+// a crash the old or the new contents stand there, never a mixture. Errors name the path and say what the
+// system said (ResourceExhausted: disk full; PermissionDenied; NotFound: no such folder; Internal: others).
 absl::Status WriteFileAtomically(const std::string& path, absl::string_view contents);
 
 // NotFound, PermissionDenied or Internal, with the path.

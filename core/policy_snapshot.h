@@ -23,7 +23,8 @@ struct PolicySpec {
   bool operator==(const PolicySpec&) const = default;
 };
 
-// Names of the networks in a snapshot. A snapshot always holds kPolicyNetwork; an algorithm adds those that it has.
+// Names of the networks in a snapshot. A snapshot always holds kPolicyNetwork; an algorithm adds those that
+// it has.
 inline constexpr char kPolicyNetwork[] = "policy";
 inline constexpr char kCritic1[] = "critic_1";
 inline constexpr char kCritic2[] = "critic_2";
@@ -35,7 +36,8 @@ struct PolicySnapshot {
   std::uint64_t updates = 0;  // updates of the learner behind it
   PolicySpec spec;
   float support_epsilon = 0.05f;  // the eps of the acting mode SUPPORT
-  std::vector<std::pair<std::string, std::vector<float>>> networks;  // name, flat parameters as nn::Mlp lays them
+  std::vector<std::pair<std::string, std::vector<float>>>
+      networks;  // name, flat parameters as nn::Mlp lays them
 
   // The parameters of a network, or null.
   const std::vector<float>* Find(absl::string_view name) const {

@@ -50,7 +50,9 @@ class Rng {
     return radius * std::cos(6.283185307179586477 * Uniform());
   }
   // A generator whose stream is independent of this one's and of other `stream` numbers'.
-  Rng Fork(std::uint64_t stream) const { return Rng(state_[0] ^ Rotate(stream * 0xd1342543de82ef95u + 1, 29)); }
+  Rng Fork(std::uint64_t stream) const {
+    return Rng(state_[0] ^ Rotate(stream * 0xd1342543de82ef95u + 1, 29));
+  }
 
   const State& state() const { return state_; }
   void set_state(const State& state) { state_ = state; }

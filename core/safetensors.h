@@ -17,11 +17,12 @@ struct TensorFile {
   std::map<std::string, std::string> metadata;        // counters, specs; the writer adds "crc32c" of the data
 };
 
-// Writes atomically (core/file_io.h). Errors: ResourceExhausted where the disk is full, NotFound, PermissionDenied.
+// Writes atomically (core/file_io.h). Errors: ResourceExhausted where the disk is full, NotFound,
+// PermissionDenied.
 absl::Status SaveTensors(const TensorFile& file, const std::string& path);
 
-// DataLoss, naming the file and what was expected and found, where it is truncated, its header is malformed, an offset
-// lies outside the data, or the checksum differs; NotFound where there is none.
+// DataLoss, naming the file and what was expected and found, where it is truncated, its header is malformed,
+// an offset lies outside the data, or the checksum differs; NotFound where there is none.
 absl::StatusOr<TensorFile> LoadTensors(const std::string& path);
 
 // A policy as a file: one tensor for each network, the spec and version in the metadata.

@@ -6,11 +6,12 @@
 
 namespace dbr {
 
-// Blocks SIGINT and SIGTERM in the calling thread and in all threads it starts later. The first line of every main:
-// a gRPC thread that exists before would take the signal and nothing would drain. Ignores SIGPIPE.
+// Blocks SIGINT and SIGTERM in the calling thread and in all threads it starts later. The first line of every
+// main: a gRPC thread that exists before would take the signal and nothing would drain. Ignores SIGPIPE.
 void BlockShutdownSignals();
 
-// Runs `on_signal` in a thread of its own at each SIGINT or SIGTERM, until destroyed. BlockShutdownSignals() comes first.
+// Runs `on_signal` in a thread of its own at each SIGINT or SIGTERM, until destroyed. BlockShutdownSignals()
+// comes first.
 class ShutdownWatcher {
  public:
   explicit ShutdownWatcher(std::function<void()> on_signal);

@@ -9,8 +9,8 @@
 #define DBR_CONCAT_INNER(a, b) a##b
 #define DBR_CONCAT(a, b) DBR_CONCAT_INNER(a, b)
 
-#define RETURN_IF_ERROR(expression)                          \
-  do {                                                       \
+#define RETURN_IF_ERROR(expression)                                                  \
+  do {                                                                               \
     if (absl::Status dbr_status = (expression); !dbr_status.ok()) return dbr_status; \
   } while (false)
 

@@ -49,9 +49,10 @@ struct TransitionLayout {
 
 // How an episode went; known with the transition that ended it.
 struct EpisodeEnd {
-  float episode_return = 0;                                 // undiscounted sum of rewards
-  float score = std::numeric_limits<float>::quiet_NaN();    // 1 win, 0.5 draw, 0 loss; NaN: the environment has none
-  int length = 0;                                           // steps of the agent
+  float episode_return = 0;  // undiscounted sum of rewards
+  float score =
+      std::numeric_limits<float>::quiet_NaN();  // 1 win, 0.5 draw, 0 loss; NaN: the environment has none
+  int length = 0;                               // steps of the agent
 };
 
 }  // namespace dbr

@@ -1,4 +1,5 @@
-// The interface of a learning algorithm. One file in algorithms/ for each; composed of parts/, no other base class.
+// The interface of a learning algorithm. One file in algorithms/ for each; composed of parts/, no other base
+// class.
 #pragma once
 
 #include <cstdint>
@@ -55,8 +56,8 @@ class Algorithm {
 
   virtual BatchNeeds needs() const = 0;
 
-  // One update. Allocates nothing once batch sizes have settled. Internal, naming the quantity, where a loss or a
-  // parameter is no longer finite: the state is then worthless and training must stop.
+  // One update. Allocates nothing once batch sizes have settled. Internal, naming the quantity, where a loss
+  // or a parameter is no longer finite: the state is then worthless and training must stop.
   virtual absl::Status Update(const UpdateBatches& batches) = 0;
 
   // Of the newest update: an advantage for each transition of its uniform batch, and metrics.
@@ -69,9 +70,11 @@ class Algorithm {
   // The networks that actors and evaluators need; version and updates are the caller's to fill.
   virtual void ExportPolicy(PolicySnapshot* snapshot) const = 0;
 
-  // Everything that continuing bit for bit needs: parameters, targets, optimizer moments, multipliers, counters.
+  // Everything that continuing bit for bit needs: parameters, targets, optimizer moments, multipliers,
+  // counters.
   virtual void Save(TensorFile* file) const = 0;
-  // DataLoss or InvalidArgument, naming the tensor, where one is missing or of another size; the state is then unspecified.
+  // DataLoss or InvalidArgument, naming the tensor, where one is missing or of another size; the state is
+  // then unspecified.
   virtual absl::Status Load(const TensorFile& file) = 0;
 };
 

@@ -26,7 +26,8 @@ absl::Status Checkpoints::Save(std::uint64_t updates, const TensorFile& file) {
   std::filesystem::create_directories(folder_, error);
   RETURN_IF_ERROR(SaveTensors(file, absl::StrFormat("%s/%012d.safetensors", folder_, updates)));
   const std::vector<std::string> paths = Newest();
-  for (std::size_t i = static_cast<std::size_t>(keep_); i < paths.size(); ++i) std::filesystem::remove(paths[i], error);
+  for (std::size_t i = static_cast<std::size_t>(keep_); i < paths.size(); ++i)
+    std::filesystem::remove(paths[i], error);
   return absl::OkStatus();
 }
 
@@ -43,8 +44,8 @@ absl::StatusOr<Checkpoints::Loaded> Checkpoints::LoadNewest() const {
     }
     loaded.refused.push_back(std::string(file.status().message()));
   }
-  return absl::DataLossError(absl::StrCat("every checkpoint in ", folder_, " is damaged: ",
-                                          absl::StrJoin(loaded.refused, "; ")));
+  return absl::DataLossError(
+      absl::StrCat("every checkpoint in ", folder_, " is damaged: ", absl::StrJoin(loaded.refused, "; ")));
 }
 
 }  // namespace dbr

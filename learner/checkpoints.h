@@ -25,7 +25,8 @@ class Checkpoints {
     std::string path;
     std::vector<std::string> refused;  // newer files that are damaged, each with what is wrong with it
   };
-  // The newest file that is whole. NotFound where the folder has none; DataLoss, naming each, where all are damaged.
+  // The newest file that is whole. NotFound where the folder has none; DataLoss, naming each, where all are
+  // damaged.
   absl::StatusOr<Loaded> LoadNewest() const;
 
  private:

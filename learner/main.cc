@@ -36,9 +36,10 @@ struct Arguments {
 };
 
 absl::StatusOr<AlgorithmSpec> MakeSpec(const Config& config) {
-  ASSIGN_OR_RETURN(const std::unique_ptr<Env> env,
-                   MakeEnv({.name = config.env().name(),
-                            .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
+  ASSIGN_OR_RETURN(
+      const std::unique_ptr<Env> env,
+      MakeEnv({.name = config.env().name(),
+               .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
   return AlgorithmSpec{.env = env->spec().name,
                        .observation_size = env->spec().observation_size,
                        .actions = env->spec().actions,
@@ -56,7 +57,8 @@ absl::Status Resume(const RunFolder& folder, const LearnerConfig& config, Traine
     return absl::OkStatus();
   }
   RETURN_IF_ERROR(loaded.status());
-  for (const std::string& refused : loaded->refused) spdlog::warn("refused a damaged checkpoint: {}", refused);
+  for (const std::string& refused : loaded->refused)
+    spdlog::warn("refused a damaged checkpoint: {}", refused);
   if (const absl::Status status = trainer->Load(loaded->file); !status.ok()) {
     return absl::Status(status.code(), absl::StrCat("cannot resume from ", loaded->path, ": ",
                                                     std::string(status.message())));
@@ -71,7 +73,8 @@ void WriteEvaluation(const EvaluationReport& report, MetricsSink* metrics) {
   if (std::isfinite(report.score_mean())) {
     scalars.emplace_back(absl::StrCat(tags::kEvaluationScore, against), report.score_mean());
   }
-  const absl::Status status = metrics->Write(static_cast<std::int64_t>(report.updates()), absl::Now(), scalars);
+  const absl::Status status =
+      metrics->Write(static_cast<std::int64_t>(report.updates()), absl::Now(), scalars);
   if (!status.ok()) spdlog::error("metrics: {}", std::string(status.message()));
 }
 
@@ -83,7 +86,8 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
                    MetricsSink::Open(arguments.folder, kMetricsFlush, absl::Now()));
   PolicyService service([&](const EvaluationReport& report) { WriteEvaluation(report, metrics.get()); });
   Saver saver(arguments.folder, static_cast<int>(learner.keep_checkpoints()));
-  ReplayClient draws(arguments.replay_address), labels(arguments.replay_address), stats(arguments.replay_address);
+  ReplayClient draws(arguments.replay_address), labels(arguments.replay_address),
+      stats(arguments.replay_address);
   const BatchNeeds needs = algorithm->needs();
   const TransitionLayout layout{spec.observation_size, spec.actions.width(), spec.actions.mask_width()};
   TrainerParts parts{.algorithm = std::move(algorithm),
@@ -99,8 +103,9 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
   Trainer trainer(learner, std::move(parts));
   if (arguments.resume) RETURN_IF_ERROR(Resume(arguments.folder, learner, &trainer));
 
-  ASSIGN_OR_RETURN(const RunningServer running,
-                   StartServer({arguments.address, arguments.allow_insecure || learner.allow_insecure()}, {&service}));
+  ASSIGN_OR_RETURN(
+      const RunningServer running,
+      StartServer({arguments.address, arguments.allow_insecure || learner.allow_insecure()}, {&service}));
   spdlog::info("listening on {}", running.address);
   absl::Status status;
   {
@@ -120,11 +125,15 @@ int Main(int argc, char** argv) {
   CLI::App app("Trains an algorithm from a replay server and serves its policy.", "dbr-learner");
   Arguments arguments;
   app.add_option("--config", arguments.config_path, "Text-format config")->required();
-  app.add_option("--run-dir", arguments.folder.root, "Folder of the run: checkpoints, policy, metrics")->required();
-  app.add_option("--replay", arguments.replay_address, "Address of the replay server (default: in the run folder)");
-  app.add_option("--address", arguments.address, "Address to serve on (default: a unix socket in the run folder)");
+  app.add_option("--run-dir", arguments.folder.root, "Folder of the run: checkpoints, policy, metrics")
+      ->required();
+  app.add_option("--replay", arguments.replay_address,
+                 "Address of the replay server (default: in the run folder)");
+  app.add_option("--address", arguments.address,
+                 "Address to serve on (default: a unix socket in the run folder)");
   app.add_flag("--resume", arguments.resume, "Continue from the newest checkpoint of the run folder");
-  app.add_flag("--allow-insecure", arguments.allow_insecure, "Serve an address that other machines can reach");
+  app.add_flag("--allow-insecure", arguments.allow_insecure,
+               "Serve an address that other machines can reach");
   app.footer("Example: dbr-learner --config deploy/configs/connect4.textproto --run-dir runs/mine");
   try {
     app.parse(argc, argv);

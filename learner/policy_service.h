@@ -29,7 +29,8 @@ class PolicyService final : public Policy::Service {
 
   grpc::Status Subscribe(grpc::ServerContext* context, const SubscribeRequest* request,
                          grpc::ServerWriter<PolicyMessage>* writer) override;
-  grpc::Status Status(grpc::ServerContext* context, const LearnerStatusRequest* request, LearnerStatus* reply) override;
+  grpc::Status Status(grpc::ServerContext* context, const LearnerStatusRequest* request,
+                      LearnerStatus* reply) override;
   grpc::Status ReportEvaluation(grpc::ServerContext* context, const EvaluationReport* report,
                                 EvaluationReportReply* reply) override;
 
@@ -42,7 +43,7 @@ class PolicyService final : public Policy::Service {
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   std::shared_ptr<const PolicyMessage> newest_ ABSL_GUARDED_BY(mutex_);
   LearnerStatus status_ ABSL_GUARDED_BY(mutex_);
-  std::map<std::string, EvaluationReport> evaluations_ ABSL_GUARDED_BY(mutex_);  // by opponent
+  std::map<std::string, EvaluationReport> evaluations_ ABSL_GUARDED_BY(mutex_);   // by opponent
   std::map<std::uint64_t, std::uint64_t> sent_versions_ ABSL_GUARDED_BY(mutex_);  // by subscription
   std::uint64_t next_subscription_ ABSL_GUARDED_BY(mutex_) = 0;
 };

@@ -42,7 +42,9 @@ absl::StatusOr<std::unique_ptr<DrawnBatches>> Prefetcher::Next() {
   return final_.ok() ? absl::CancelledError("the prefetcher is closed") : final_;
 }
 
-void Prefetcher::Recycle(std::unique_ptr<DrawnBatches> batches) { free_.TryPush(std::move(batches)); }
+void Prefetcher::Recycle(std::unique_ptr<DrawnBatches> batches) {
+  free_.TryPush(std::move(batches));
+}
 
 double Prefetcher::starved_share() const {
   absl::MutexLock lock(&mutex_);
@@ -53,8 +55,10 @@ void Prefetcher::Run() {
   bool away = false;
   std::unique_ptr<DrawnBatches> batches;
   for (;;) {
-    if (batches == nullptr) batches = free_.Pop(absl::ZeroDuration()).value_or(std::make_unique<DrawnBatches>());
-    const absl::Status status = client_->Sample(options_.counts, options_.layout, options_.call_timeout, batches.get());
+    if (batches == nullptr)
+      batches = free_.Pop(absl::ZeroDuration()).value_or(std::make_unique<DrawnBatches>());
+    const absl::Status status =
+        client_->Sample(options_.counts, options_.layout, options_.call_timeout, batches.get());
     if (!status.ok()) {
       if (!HandleFailure(status, &away)) break;
       continue;

@@ -17,13 +17,13 @@ namespace dbr {
 struct PrefetcherOptions {
   DrawCounts counts;
   TransitionLayout layout;
-  int depth = 2;                                         // batches ready ahead
-  absl::Duration call_timeout = absl::Seconds(5);        // of one Sample call; a call held that long is made again
+  int depth = 2;                                   // batches ready ahead
+  absl::Duration call_timeout = absl::Seconds(5);  // of one Sample call; a call held that long is made again
   absl::Duration retry_after = absl::Milliseconds(500);  // after a loss of the server
 };
 
-// Draws in a thread of its own until closed. A server that goes away, and its return, are said once each; batches that
-// the rate limiter holds back are waited for. A refusal (widths that differ) is final.
+// Draws in a thread of its own until closed. A server that goes away, and its return, are said once each;
+// batches that the rate limiter holds back are waited for. A refusal (widths that differ) is final.
 class Prefetcher {
  public:
   // `client` outlives the prefetcher.

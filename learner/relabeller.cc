@@ -11,14 +11,17 @@ constexpr std::size_t kQueuedUpdates = 64;
 constexpr absl::Duration kCallTimeout = absl::Seconds(5);
 }  // namespace
 
-Relabeller::Relabeller(ReplayClient* client) : client_(client), queue_(kQueuedUpdates), thread_([this] { Run(); }) {}
+Relabeller::Relabeller(ReplayClient* client)
+    : client_(client), queue_(kQueuedUpdates), thread_([this] { Run(); }) {}
 
 Relabeller::~Relabeller() {
   Close();
   thread_.join();
 }
 
-void Relabeller::Close() { queue_.Close(); }
+void Relabeller::Close() {
+  queue_.Close();
+}
 
 void Relabeller::Offer(std::uint64_t critic_version, absl::Span<const std::uint64_t> keys,
                        absl::Span<const float> advantages) {
@@ -30,14 +33,16 @@ void Relabeller::Run() {
   bool away = false;
   while (std::optional<Labels> labels = queue_.Pop()) {
     if (queue_.closed()) return;
-    const auto reply = client_->Relabel(labels->critic_version, labels->keys, labels->advantages, kCallTimeout);
+    const auto reply =
+        client_->Relabel(labels->critic_version, labels->keys, labels->advantages, kCallTimeout);
     if (reply.ok()) {
       away = false;
       continue;
     }
     dropped_.fetch_add(labels->keys.size(), std::memory_order_relaxed);
     if (!std::exchange(away, true) && !absl::IsCancelled(reply.status())) {
-      spdlog::warn("advantages are not taken by the replay server: {}", std::string(reply.status().message()));
+      spdlog::warn("advantages are not taken by the replay server: {}",
+                   std::string(reply.status().message()));
     }
   }
 }

@@ -12,8 +12,8 @@
 
 namespace dbr {
 
-// Sends in a thread of its own, so that an update never waits. What is offered while the queue is full is dropped and
-// counted: the transitions keep their older labels until they are drawn again.
+// Sends in a thread of its own, so that an update never waits. What is offered while the queue is full is
+// dropped and counted: the transitions keep their older labels until they are drawn again.
 class Relabeller {
  public:
   // `client` outlives the relabeller.
@@ -21,7 +21,8 @@ class Relabeller {
   ~Relabeller();  // Close() and join
 
   // Does not block.
-  void Offer(std::uint64_t critic_version, absl::Span<const std::uint64_t> keys, absl::Span<const float> advantages);
+  void Offer(std::uint64_t critic_version, absl::Span<const std::uint64_t> keys,
+             absl::Span<const float> advantages);
   std::uint64_t dropped() const { return dropped_.load(std::memory_order_relaxed); }
 
   void Close();  // from any thread; what is queued is dropped

@@ -44,9 +44,11 @@ void RolloutReporter::Report(const StatsReply& stats) {
   if (stats.episodes() > 0) {
     scalars.emplace_back(tags::kEpisodeReturn, stats.recent_return_mean());
     scalars.emplace_back(tags::kEpisodeLength, stats.recent_length_mean());
-    if (std::isfinite(stats.recent_score_mean())) scalars.emplace_back(tags::kEpisodeScore, stats.recent_score_mean());
+    if (std::isfinite(stats.recent_score_mean()))
+      scalars.emplace_back(tags::kEpisodeScore, stats.recent_score_mean());
   }
-  const absl::Status status = metrics_->Write(static_cast<std::int64_t>(stats.inserted()), absl::Now(), scalars);
+  const absl::Status status =
+      metrics_->Write(static_cast<std::int64_t>(stats.inserted()), absl::Now(), scalars);
   if (!status.ok()) spdlog::error("metrics: {}", std::string(status.message()));
 }
 

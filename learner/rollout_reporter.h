@@ -11,8 +11,8 @@
 
 namespace dbr {
 
-// Asks for the statistics every `period` in a thread of its own and writes a row of metrics for each answer, at the
-// number of inserted transitions as its step.
+// Asks for the statistics every `period` in a thread of its own and writes a row of metrics for each answer,
+// at the number of inserted transitions as its step.
 class RolloutReporter {
  public:
   // Both outlive the reporter.

@@ -21,7 +21,9 @@ Saver::~Saver() {
   thread_.join();
 }
 
-bool Saver::Offer(Checkpoint checkpoint) { return queue_.TryPush(std::move(checkpoint)); }
+bool Saver::Offer(Checkpoint checkpoint) {
+  return queue_.TryPush(std::move(checkpoint));
+}
 
 absl::Status Saver::SaveNow(const Checkpoint& checkpoint) {
   absl::MutexLock lock(&writing_);

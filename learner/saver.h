@@ -22,8 +22,8 @@ struct Checkpoint {
   PolicySnapshot policy;
 };
 
-// Writes in a thread of its own: checkpoints/UPDATES.safetensors and policy/latest.safetensors. An error (a full disk) is
-// logged and what stood there before stays; training goes on.
+// Writes in a thread of its own: checkpoints/UPDATES.safetensors and policy/latest.safetensors. An error (a
+// full disk) is logged and what stood there before stays; training goes on.
 class Saver {
  public:
   Saver(const RunFolder& folder, int keep);

@@ -15,7 +15,8 @@ constexpr char kUpdates[] = "learner.updates";
 constexpr char kVersion[] = "learner.policy_version";
 }  // namespace
 
-Trainer::Trainer(const LearnerConfig& config, TrainerParts parts) : config_(config), parts_(std::move(parts)) {}
+Trainer::Trainer(const LearnerConfig& config, TrainerParts parts)
+    : config_(config), parts_(std::move(parts)) {}
 
 absl::Status Trainer::Load(const TensorFile& file) {
   RETURN_IF_ERROR(parts_.algorithm->Load(file));
@@ -28,7 +29,8 @@ absl::Status Trainer::Run() {
   updates_at_record_ = updates_;
   Publish();
   absl::Status status;
-  while (status.ok() && (config_.max_updates() == 0 || updates_ < config_.max_updates())) status = UpdateOnce();
+  while (status.ok() && (config_.max_updates() == 0 || updates_ < config_.max_updates()))
+    status = UpdateOnce();
   const bool stopped = absl::IsCancelled(status);
   if (!status.ok() && !stopped) return status;  // the state may be worthless: the checkpoints before it stay
   Publish();
@@ -94,8 +96,10 @@ void Trainer::Record() {
                      {"time/updates_per_second", updates_per_second_},
                      {"learner/starved_share", parts_.prefetcher->starved_share()},
                      {"learner/labels_dropped", static_cast<double>(parts_.relabeller->dropped())}};
-  for (const UpdateMetric& metric : parts_.algorithm->metrics()) scalars.emplace_back(metric.name, metric.value);
-  if (const absl::Status status = parts_.metrics->Write(static_cast<std::int64_t>(updates_), now, scalars); !status.ok()) {
+  for (const UpdateMetric& metric : parts_.algorithm->metrics())
+    scalars.emplace_back(metric.name, metric.value);
+  if (const absl::Status status = parts_.metrics->Write(static_cast<std::int64_t>(updates_), now, scalars);
+      !status.ok()) {
     spdlog::error("metrics: {}", std::string(status.message()));
   }
 }

@@ -36,8 +36,8 @@ class Trainer {
   // Continues from a checkpoint that Save() made.
   absl::Status Load(const TensorFile& file);
 
-  // Publishes the first policy, then updates until stopped, an error, or max_updates; saves at the end. After max_updates
-  // it goes on serving until Stop. OK after Stop.
+  // Publishes the first policy, then updates until stopped, an error, or max_updates; saves at the end. After
+  // max_updates it goes on serving until Stop. OK after Stop.
   absl::Status Run();
   void Stop();
 

@@ -14,7 +14,9 @@ class Adam {
  public:
   Adam() = default;
   Adam(Eigen::Index size, double learning_rate)
-      : learning_rate_(learning_rate), first_(VectorX<Scalar>::Zero(size)), second_(VectorX<Scalar>::Zero(size)) {}
+      : learning_rate_(learning_rate),
+        first_(VectorX<Scalar>::Zero(size)),
+        second_(VectorX<Scalar>::Zero(size)) {}
 
   // parameters -= learning_rate * m^ / (sqrt(v^) + 1e-8), in one pass.
   void Step(const VectorX<Scalar>& gradient, VectorX<Scalar>* parameters) {

@@ -4,6 +4,8 @@ extern "C" void openblas_set_num_threads(int threads);
 
 namespace dbr {
 
-void UseOneBlasThread() { openblas_set_num_threads(1); }
+void UseOneBlasThread() {
+  openblas_set_num_threads(1);
+}
 
 }  // namespace dbr

@@ -3,7 +3,8 @@
 
 namespace dbr {
 
-// Keeps OpenBLAS from starting threads of its own for matrix products. At the start of each program that multiplies.
+// Keeps OpenBLAS from starting threads of its own for matrix products. At the start of each program that
+// multiplies.
 void UseOneBlasThread();
 
 }  // namespace dbr

@@ -71,13 +71,14 @@ void SoftmaxGradient(const Categorical<Scalar>& p, MatrixX<Scalar>* gradient) {
   }
 }
 
-#define DBR_INSTANTIATE(Scalar)                                                                                      \
-  template void MaskedSoftmax<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&,                 \
-                                      Categorical<Scalar>*);                                                        \
-  template Scalar NegativeLogLikelihood<Scalar>(const Categorical<Scalar>&, const ConstMatrixRef<Scalar>&,          \
-                                                MatrixX<Scalar>*);                                                  \
-  template void Entropy<Scalar>(const Categorical<Scalar>&, VectorX<Scalar>*);                                      \
-  template void KlDivergence<Scalar>(const Categorical<Scalar>&, const Categorical<Scalar>&, VectorX<Scalar>*);     \
+#define DBR_INSTANTIATE(Scalar)                                                                            \
+  template void MaskedSoftmax<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&,        \
+                                      Categorical<Scalar>*);                                               \
+  template Scalar NegativeLogLikelihood<Scalar>(const Categorical<Scalar>&, const ConstMatrixRef<Scalar>&, \
+                                                MatrixX<Scalar>*);                                         \
+  template void Entropy<Scalar>(const Categorical<Scalar>&, VectorX<Scalar>*);                             \
+  template void KlDivergence<Scalar>(const Categorical<Scalar>&, const Categorical<Scalar>&,               \
+                                     VectorX<Scalar>*);                                                    \
   template void SoftmaxGradient<Scalar>(const Categorical<Scalar>&, MatrixX<Scalar>*);
 
 DBR_INSTANTIATE(float)

@@ -6,8 +6,8 @@
 
 namespace dbr {
 
-// log p and p of a softmax over the legal actions alone; one column for each sample. Illegal entries: p = 0, log p = 0
-// (they never contribute). A column without any legal action (after an episode's end) is all zeros.
+// log p and p of a softmax over the legal actions alone; one column for each sample. Illegal entries: p = 0,
+// log p = 0 (they never contribute). A column without any legal action (after an episode's end) is all zeros.
 template <class Scalar>
 struct Categorical {
   MatrixX<Scalar> log_probabilities;  // [actions x n]
@@ -19,8 +19,8 @@ template <class Scalar>
 void MaskedSoftmax(const ConstMatrixRef<Scalar>& logits, const ConstMatrixRef<Scalar>& masks,
                    Categorical<Scalar>* distribution);
 
-// The mean over the batch of -log p(a|s), and its gradient with respect to the logits [actions x n] (may be null).
-// actions [1 x n] hold indices of legal actions.
+// The mean over the batch of -log p(a|s), and its gradient with respect to the logits [actions x n] (may be
+// null). actions [1 x n] hold indices of legal actions.
 template <class Scalar>
 Scalar NegativeLogLikelihood(const Categorical<Scalar>& distribution, const ConstMatrixRef<Scalar>& actions,
                              MatrixX<Scalar>* d_logits);

@@ -64,8 +64,8 @@ double MlpShape::ParameterGradientFlops(Eigen::Index n) const {
 }
 
 template <class Scalar>
-const MatrixX<Scalar>& MlpForward(const MlpShape& shape, const Scalar* parameters, const ConstMatrixRef<Scalar>& x,
-                                  MlpActivations<Scalar>* activations) {
+const MatrixX<Scalar>& MlpForward(const MlpShape& shape, const Scalar* parameters,
+                                  const ConstMatrixRef<Scalar>& x, MlpActivations<Scalar>* activations) {
   DBR_CHECK(x.rows() == shape.input_size());
   const int layers = shape.layer_count();
   activations->outputs.resize(layers);
@@ -91,7 +91,8 @@ void MlpParameterGradient(const MlpShape& shape, const Scalar* parameters, const
   gradient->resize(shape.parameter_count());
   activations->deltas.resize(layers - 1);
   const auto layer_gradient = [&](int layer, const auto& delta, const auto& input) {
-    Eigen::Map<MatrixX<Scalar>> weight(gradient->data() + shape.weight_offset(layer), shape.out(layer), shape.in(layer));
+    Eigen::Map<MatrixX<Scalar>> weight(gradient->data() + shape.weight_offset(layer), shape.out(layer),
+                                       shape.in(layer));
     Eigen::Map<VectorX<Scalar>> bias(gradient->data() + shape.bias_offset(layer), shape.out(layer));
     weight.noalias() = delta * input.transpose();
     bias = delta.col(0);
@@ -131,7 +132,8 @@ VectorX<Scalar> InitialParameters(const MlpShape& shape, Rng& rng) {
   VectorX<Scalar> parameters(shape.parameter_count());
   for (int layer = 0; layer < shape.layer_count(); ++layer) {
     const double bound = 1.0 / std::sqrt(static_cast<double>(shape.in(layer)));
-    const Eigen::Index end = layer + 1 < shape.layer_count() ? shape.weight_offset(layer + 1) : shape.parameter_count();
+    const Eigen::Index end =
+        layer + 1 < shape.layer_count() ? shape.weight_offset(layer + 1) : shape.parameter_count();
     for (Eigen::Index i = shape.weight_offset(layer); i < end; ++i) {
       parameters[i] = static_cast<Scalar>(bound * (2.0 * rng.Uniform() - 1.0));
     }
@@ -144,15 +146,15 @@ void PolyakUpdate(const VectorX<Scalar>& online, Scalar tau, VectorX<Scalar>* ta
   *target += tau * (online - *target);
 }
 
-#define DBR_INSTANTIATE(Scalar)                                                                                        \
-  template const MatrixX<Scalar>& MlpForward<Scalar>(const MlpShape&, const Scalar*, const ConstMatrixRef<Scalar>&,   \
-                                                     MlpActivations<Scalar>*);                                        \
-  template void MlpParameterGradient<Scalar>(const MlpShape&, const Scalar*, const ConstMatrixRef<Scalar>&,           \
-                                             const ConstMatrixRef<Scalar>&, MlpActivations<Scalar>*,                  \
-                                             VectorX<Scalar>*);                                                       \
-  template void MlpInputGradient<Scalar>(const MlpShape&, const Scalar*, const ConstMatrixRef<Scalar>&,               \
-                                         MlpActivations<Scalar>*, MatrixX<Scalar>*);                                  \
-  template VectorX<Scalar> InitialParameters<Scalar>(const MlpShape&, Rng&);                                          \
+#define DBR_INSTANTIATE(Scalar)                                                                             \
+  template const MatrixX<Scalar>& MlpForward<Scalar>(                                                       \
+      const MlpShape&, const Scalar*, const ConstMatrixRef<Scalar>&, MlpActivations<Scalar>*);              \
+  template void MlpParameterGradient<Scalar>(const MlpShape&, const Scalar*, const ConstMatrixRef<Scalar>&, \
+                                             const ConstMatrixRef<Scalar>&, MlpActivations<Scalar>*,        \
+                                             VectorX<Scalar>*);                                             \
+  template void MlpInputGradient<Scalar>(const MlpShape&, const Scalar*, const ConstMatrixRef<Scalar>&,     \
+                                         MlpActivations<Scalar>*, MatrixX<Scalar>*);                        \
+  template VectorX<Scalar> InitialParameters<Scalar>(const MlpShape&, Rng&);                                \
   template void PolyakUpdate<Scalar>(const VectorX<Scalar>&, Scalar, VectorX<Scalar>*);
 
 DBR_INSTANTIATE(float)

@@ -1,17 +1,16 @@
 // A multi-layer perceptron with ReLU hidden layers whose parameters are ONE flat vector.
 #pragma once
 
-#include <vector>
-
 #include <Eigen/Core>
+#include <vector>
 
 #include "core/batch.h"
 #include "core/rng.h"
 
 namespace dbr {
 
-// Sizes of the layers, and where each layer's parameters lie in the flat vector: for each layer in turn its weight
-// [out x in], column-major, then its bias [out].
+// Sizes of the layers, and where each layer's parameters lie in the flat vector: for each layer in turn its
+// weight [out x in], column-major, then its bias [out].
 class MlpShape {
  public:
   MlpShape() = default;
@@ -28,7 +27,8 @@ class MlpShape {
 
   // Useful floating-point operations of the matrix products for n samples: 2 m n k each.
   double ForwardFlops(Eigen::Index n) const;
-  double ParameterGradientFlops(Eigen::Index n) const;  // weight gradients, and the deltas of all layers but the input
+  double ParameterGradientFlops(
+      Eigen::Index n) const;  // weight gradients, and the deltas of all layers but the input
 
  private:
   std::vector<int> sizes_;
@@ -47,11 +47,11 @@ using ConstMatrixRef = Eigen::Ref<const MatrixX<Scalar>>;
 
 // y = f(x), [output x n] from x [input x n]; the result lies in `activations`, valid until its next use.
 template <class Scalar>
-const MatrixX<Scalar>& MlpForward(const MlpShape& shape, const Scalar* parameters, const ConstMatrixRef<Scalar>& x,
-                                  MlpActivations<Scalar>* activations);
+const MatrixX<Scalar>& MlpForward(const MlpShape& shape, const Scalar* parameters,
+                                  const ConstMatrixRef<Scalar>& x, MlpActivations<Scalar>* activations);
 
-// The gradient of sum(dy .* y) with respect to the parameters, overwriting `gradient` [parameter_count], for the x and
-// activations of a forward pass with the same parameters. The input's gradient is not computed.
+// The gradient of sum(dy .* y) with respect to the parameters, overwriting `gradient` [parameter_count], for
+// the x and activations of a forward pass with the same parameters. The input's gradient is not computed.
 template <class Scalar>
 void MlpParameterGradient(const MlpShape& shape, const Scalar* parameters, const ConstMatrixRef<Scalar>& x,
                           const ConstMatrixRef<Scalar>& dy, MlpActivations<Scalar>* activations,

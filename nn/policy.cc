@@ -20,11 +20,13 @@ absl::Status CheckSpec(const PolicySpec& spec) {
     return absl::InvalidArgumentError("action space: expected a discrete one, found a continuous one");
   }
   if (spec.observation_size <= 0 || spec.actions.size <= 0) {
-    return absl::InvalidArgumentError(absl::StrCat("expected sizes above 0, found observation_size ", spec.observation_size,
-                                                   " and ", spec.actions.size, " actions"));
+    return absl::InvalidArgumentError(absl::StrCat("expected sizes above 0, found observation_size ",
+                                                   spec.observation_size, " and ", spec.actions.size,
+                                                   " actions"));
   }
   for (const int size : spec.hidden_sizes) {
-    if (size <= 0) return absl::InvalidArgumentError(absl::StrCat("hidden_sizes: expected above 0, found ", size));
+    if (size <= 0)
+      return absl::InvalidArgumentError(absl::StrCat("hidden_sizes: expected above 0, found ", size));
   }
   return absl::OkStatus();
 }
@@ -49,7 +51,8 @@ int Draw(const MatrixX<float>& probabilities, const ConstMatrixRef<float>& masks
   return last_legal;
 }
 
-// Greatest Q among the actions with beta+ >= max(eps, beta-), else greatest beta+ / beta- (docs/algorithms.md, DBR).
+// Greatest Q among the actions with beta+ >= max(eps, beta-), else greatest beta+ / beta-
+// (docs/algorithms.md, DBR).
 int SupportAction(const PolicyView& view, const ConstMatrixRef<float>& masks, float epsilon, Eigen::Index j) {
   int best = -1, fallback = -1;
   float best_ratio = -1;
@@ -72,7 +75,8 @@ absl::StatusOr<std::shared_ptr<const PolicyNetworks>> PolicyNetworks::Create(Pol
   if (absl::Status status = CheckSpec(snapshot.spec); !status.ok()) return status;
   const auto expected = static_cast<std::size_t>(ShapeOf(snapshot.spec).parameter_count());
   if (snapshot.Find(kPolicyNetwork) == nullptr) {
-    return absl::InvalidArgumentError(absl::StrCat("network '", kPolicyNetwork, "' is missing from the policy"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("network '", kPolicyNetwork, "' is missing from the policy"));
   }
   for (const auto& [name, parameters] : snapshot.networks) {
     if (parameters.size() != expected) {
@@ -97,13 +101,15 @@ struct PolicyRunner::State {
   PolicyView view;
 
   // [actions x n] outputs of a network of the policy.
-  const MatrixX<float>& Run(const PolicyNetworks& policy, const char* name, const ConstMatrixRef<float>& observations) {
+  const MatrixX<float>& Run(const PolicyNetworks& policy, const char* name,
+                            const ConstMatrixRef<float>& observations) {
     const std::vector<float>* parameters = policy.snapshot().Find(name);
     DBR_CHECK(parameters != nullptr);
     return MlpForward(ShapeOf(policy.spec()), parameters->data(), observations, &activations);
   }
-  void RunCategorical(const PolicyNetworks& policy, const char* name, const ConstMatrixRef<float>& observations,
-                      const ConstMatrixRef<float>& masks, MatrixX<float>* probabilities) {
+  void RunCategorical(const PolicyNetworks& policy, const char* name,
+                      const ConstMatrixRef<float>& observations, const ConstMatrixRef<float>& masks,
+                      MatrixX<float>* probabilities) {
     MaskedSoftmax<float>(Run(policy, name, observations), masks, &distribution);
     probabilities->swap(distribution.probabilities);
   }
@@ -130,13 +136,16 @@ struct PolicyRunner::State {
 PolicyRunner::PolicyRunner() : state_(std::make_unique<State>()) {}
 PolicyRunner::~PolicyRunner() = default;
 
-absl::Status PolicyRunner::Act(const PolicyNetworks& policy, ActingMode mode, const ConstMatrixRef<float>& observations,
-                               const ConstMatrixRef<float>& masks, Rng& rng, Eigen::Ref<MatrixX<float>> actions) {
+absl::Status PolicyRunner::Act(const PolicyNetworks& policy, ActingMode mode,
+                               const ConstMatrixRef<float>& observations, const ConstMatrixRef<float>& masks,
+                               Rng& rng, Eigen::Ref<MatrixX<float>> actions) {
   if ((mode == GREEDY_Q || mode == SUPPORT) && !policy.has_critics()) {
-    return absl::InvalidArgumentError("acting by Q needs critics and the policy has none: use the mode SAMPLE or MODE");
+    return absl::InvalidArgumentError(
+        "acting by Q needs critics and the policy has none: use the mode SAMPLE or MODE");
   }
   if (mode == SUPPORT && !policy.has_behavior()) {
-    return absl::InvalidArgumentError("the mode SUPPORT needs beta+ and beta- and the policy has none: use another mode");
+    return absl::InvalidArgumentError(
+        "the mode SUPPORT needs beta+ and beta- and the policy has none: use another mode");
   }
   PolicyView& view = state_->view;
   state_->RunCategorical(policy, kPolicyNetwork, observations, masks, &view.policy);

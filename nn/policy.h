@@ -1,10 +1,9 @@
 // A policy ready to act: networks rebuilt from a snapshot, evaluated for many environments at once.
 #pragma once
 
+#include <Eigen/Core>
 #include <memory>
 #include <optional>
-
-#include <Eigen/Core>
 
 #include "absl/status/statusor.h"
 #include "core/batch.h"
@@ -17,7 +16,8 @@ namespace dbr {
 // Immutable; shared by pointer between threads. Holds the snapshot that it was made from.
 class PolicyNetworks {
  public:
-  // InvalidArgument where a network is missing or its parameters are not as many as the spec asks; names the network.
+  // InvalidArgument where a network is missing or its parameters are not as many as the spec asks; names the
+  // network.
   static absl::StatusOr<std::shared_ptr<const PolicyNetworks>> Create(PolicySnapshot snapshot);
 
   const PolicySnapshot& snapshot() const { return snapshot_; }
@@ -30,8 +30,8 @@ class PolicyNetworks {
   PolicySnapshot snapshot_;
 };
 
-// Everything that the networks say of n observations; [actions x n] each, empty where the snapshot lacks the network.
-// Probabilities of illegal actions are 0; Q of illegal actions is meaningless.
+// Everything that the networks say of n observations; [actions x n] each, empty where the snapshot lacks the
+// network. Probabilities of illegal actions are 0; Q of illegal actions is meaningless.
 struct PolicyView {
   MatrixX<float> policy;
   MatrixX<float> beta_plus;
@@ -45,13 +45,17 @@ class PolicyRunner {
   PolicyRunner();
   ~PolicyRunner();
 
-  // Chooses an action for each of n columns: observations [observation x n], masks [actions x n], actions [width x n].
-  // InvalidArgument where `mode` needs networks that the snapshot lacks. A NaN Q or probability gives Internal.
-  absl::Status Act(const PolicyNetworks& policy, ActingMode mode, const Eigen::Ref<const MatrixX<float>>& observations,
-                   const Eigen::Ref<const MatrixX<float>>& masks, Rng& rng, Eigen::Ref<MatrixX<float>> actions);
+  // Chooses an action for each of n columns: observations [observation x n], masks [actions x n], actions
+  // [width x n]. InvalidArgument where `mode` needs networks that the snapshot lacks. A NaN Q or probability
+  // gives Internal.
+  absl::Status Act(const PolicyNetworks& policy, ActingMode mode,
+                   const Eigen::Ref<const MatrixX<float>>& observations,
+                   const Eigen::Ref<const MatrixX<float>>& masks, Rng& rng,
+                   Eigen::Ref<MatrixX<float>> actions);
 
-  // After Act: A = Q(s, a) - V(s) of given actions (ALGORITHMS: DBR, step 6), Q the smaller twin, V its mean under pi.
-  // [n]; the actions may be others than Act's (exploration). NaN (not yet judged) where the snapshot has no critics.
+  // After Act: A = Q(s, a) - V(s) of given actions (ALGORITHMS: DBR, step 6), Q the smaller twin, V its mean
+  // under pi. [n]; the actions may be others than Act's (exploration). NaN (not yet judged) where the
+  // snapshot has no critics.
   void Advantages(const Eigen::Ref<const MatrixX<float>>& actions, Eigen::Ref<VectorX<float>> advantages);
 
   // All of the networks' outputs, for probing.

@@ -20,8 +20,9 @@ absl::Status CheckColumn(const char* name, const Column& column, int count, int 
 
 absl::Status CheckWidth(const char* name, int expected, std::uint32_t found) {
   if (static_cast<std::uint32_t>(expected) == found) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(name, ": expected ", expected, ", found ", found,
-                                                 ". Writers and readers of one replay server share one environment."));
+  return absl::InvalidArgumentError(
+      absl::StrCat(name, ": expected ", expected, ", found ", found,
+                   ". Writers and readers of one replay server share one environment."));
 }
 
 void Append(absl::Span<const float> values, Column* column) {
@@ -54,7 +55,8 @@ absl::Status CheckShape(const TransitionBatch& batch, const TransitionLayout& la
   RETURN_IF_ERROR(CheckWidth("mask_width", layout.mask_width, batch.mask_width()));
   constexpr std::uint32_t kMaxRows = 1u << 24;
   if (batch.count() > kMaxRows) {
-    return absl::InvalidArgumentError(absl::StrCat("count: expected at most ", kMaxRows, ", found ", batch.count()));
+    return absl::InvalidArgumentError(
+        absl::StrCat("count: expected at most ", kMaxRows, ", found ", batch.count()));
   }
   const int n = static_cast<int>(batch.count());
   RETURN_IF_ERROR(CheckColumn("observations", batch.observations(), n, layout.observation_width));
@@ -66,8 +68,8 @@ absl::Status CheckShape(const TransitionBatch& batch, const TransitionLayout& la
   RETURN_IF_ERROR(CheckColumn("next_masks", batch.next_masks(), n, layout.mask_width));
   if (!batch.advantages().empty()) RETURN_IF_ERROR(CheckColumn("advantages", batch.advantages(), n, 1));
   if (!batch.critic_versions().empty() && batch.critic_versions_size() != n) {
-    return absl::InvalidArgumentError(absl::StrCat("column 'critic_versions': expected ", n, " values, found ",
-                                                   batch.critic_versions_size()));
+    return absl::InvalidArgumentError(absl::StrCat("column 'critic_versions': expected ", n,
+                                                   " values, found ", batch.critic_versions_size()));
   }
   return absl::OkStatus();
 }
@@ -87,7 +89,8 @@ void AppendTransition(const TransitionView& transition, float advantage, std::ui
 }
 
 TransitionView RowOf(const TransitionBatch& batch, int i) {
-  const std::size_t observation = batch.observation_width(), action = batch.action_width(), mask = batch.mask_width();
+  const std::size_t observation = batch.observation_width(), action = batch.action_width(),
+                    mask = batch.mask_width();
   return {.observation = {batch.observations().data() + i * observation, observation},
           .action = {batch.actions().data() + i * action, action},
           .mask = {batch.masks().data() + i * mask, mask},
@@ -130,7 +133,21 @@ PolicyMessage Encode(const PolicySnapshot& snapshot) {
   return message;
 }
 
+namespace {
+
+// Sizes beyond any network of ours would only be found by running out of memory.
+absl::Status CheckSize(const char* name, std::uint32_t found) {
+  constexpr std::uint32_t kMostUnits = 1u << 20;
+  if (found >= 1 && found <= kMostUnits) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("policy: ", name, ": expected 1 to ", kMostUnits, ", found ", found));
+}
+
+}  // namespace
+
 absl::StatusOr<PolicySnapshot> Decode(const PolicyMessage& message) {
+  RETURN_IF_ERROR(CheckSize("observation_size", message.observation_size()));
+  RETURN_IF_ERROR(CheckSize("action_size", message.action_size()));
+  for (const std::uint32_t size : message.hidden_sizes()) RETURN_IF_ERROR(CheckSize("hidden_sizes", size));
   PolicySnapshot snapshot;
   snapshot.version = message.version();
   snapshot.updates = message.updates();
@@ -146,8 +163,9 @@ absl::StatusOr<PolicySnapshot> Decode(const PolicyMessage& message) {
         network.name(), std::vector<float>(network.parameters().begin(), network.parameters().end()));
   }
   if (const std::uint32_t found = Checksum(snapshot); found != message.crc32c()) {
-    return absl::DataLossError(absl::StrCat("policy version ", message.version(), " is damaged: expected CRC-32C ",
-                                            absl::Hex(message.crc32c()), ", found ", absl::Hex(found)));
+    return absl::DataLossError(absl::StrCat("policy version ", message.version(),
+                                            " is damaged: expected CRC-32C ", absl::Hex(message.crc32c()),
+                                            ", found ", absl::Hex(found)));
   }
   return snapshot;
 }

@@ -18,7 +18,8 @@ TransitionLayout LayoutOf(const TransitionBatch& batch);
 void SetLayout(const TransitionLayout& layout, TransitionBatch* batch);
 
 // Appends one transition; `batch` has its layout set. The advantage may be kUnjudged.
-void AppendTransition(const TransitionView& transition, float advantage, std::uint64_t critic_version, TransitionBatch* batch);
+void AppendTransition(const TransitionView& transition, float advantage, std::uint64_t critic_version,
+                      TransitionBatch* batch);
 
 // Row `i` of a batch that has passed CheckShape; views into it.
 TransitionView RowOf(const TransitionBatch& batch, int i);

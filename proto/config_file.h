@@ -12,12 +12,14 @@
 namespace dbr {
 
 // Reads a text-format Config, applies `overrides` ("path.to.field=value", as of --set; a repeated field takes
-// "path=[a, b]" or "path=a"), and checks it. InvalidArgument lists ALL that is wrong: unknown fields with line and
-// column and the nearest known name, values of another type, and fields out of bounds with path, bounds and value.
+// "path=[a, b]" or "path=a"), and checks it. InvalidArgument lists ALL that is wrong: unknown fields with
+// line and column and the nearest known name, values of another type, and fields out of bounds with path,
+// bounds and value.
 absl::StatusOr<Config> LoadConfig(const std::string& path, const std::vector<std::string>& overrides = {});
 absl::StatusOr<Config> ParseConfig(absl::string_view text, const std::vector<std::string>& overrides = {});
 
-// Checks every field of `message` against the (bounds) and (required_text) options of the schema, nested ones too.
+// Checks every field of `message` against the (bounds) and (required_text) options of the schema, nested ones
+// too.
 absl::Status CheckBounds(const google::protobuf::Message& message);
 
 // The effective config as text, every field with its value, defaults included; ParseConfig reads it back.

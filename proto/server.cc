@@ -1,13 +1,13 @@
 #include "proto/server.h"
 
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
 #include <cstring>
 #include <mutex>
-
-#include <grpcpp/ext/proto_server_reflection_plugin.h>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
@@ -37,8 +37,9 @@ bool SocketIsServed(const std::string& path) {
 }
 
 absl::Status AddressInUse(absl::string_view address) {
-  return absl::AlreadyExistsError(absl::StrCat(
-      "cannot listen on ", address, ": the address is in use. Stop the program that serves it or choose another address."));
+  return absl::AlreadyExistsError(
+      absl::StrCat("cannot listen on ", address,
+                   ": the address is in use. Stop the program that serves it or choose another address."));
 }
 
 absl::Status CheckAddress(const ServerOptions& options) {
@@ -48,12 +49,17 @@ absl::Status CheckAddress(const ServerOptions& options) {
     constexpr std::size_t kMaxPath = sizeof(sockaddr_un::sun_path) - 1;
     if (path.empty() || path.size() > kMaxPath) {
       return absl::InvalidArgumentError(absl::StrCat("socket path '", path, "': expected 1 to ", kMaxPath,
-                                                     " characters, found ", path.size(), ". Use a shorter run folder."));
+                                                     " characters, found ", path.size(),
+                                                     ". Use a shorter run folder."));
     }
-    if (access(path.c_str(), F_OK) == 0) {
-      if (SocketIsServed(path)) return AddressInUse(address);
-      unlink(path.c_str());
+    struct stat found;
+    if (lstat(path.c_str(), &found) != 0) return absl::OkStatus();
+    if (!S_ISSOCK(found.st_mode)) {
+      return absl::InvalidArgumentError(absl::StrCat("cannot listen on ", address,
+                                                     ": expected a socket or nothing at that path, found another file"));
     }
+    if (SocketIsServed(path)) return AddressInUse(address);
+    unlink(path.c_str());
     return absl::OkStatus();
   }
   if (address.find(':') == absl::string_view::npos) {
@@ -62,7 +68,8 @@ absl::Status CheckAddress(const ServerOptions& options) {
   }
   if (!IsLoopback(address) && !options.allow_insecure) {
     return absl::InvalidArgumentError(
-        absl::StrCat("address '", address, "' can be reached from other machines and there is no authentication yet: "
+        absl::StrCat("address '", address,
+                     "' can be reached from other machines and there is no authentication yet: "
                      "use a unix socket or 127.0.0.1, or say --allow-insecure on a network that you trust."));
   }
   return absl::OkStatus();
@@ -70,7 +77,8 @@ absl::Status CheckAddress(const ServerOptions& options) {
 
 }  // namespace
 
-absl::StatusOr<RunningServer> StartServer(const ServerOptions& options, const std::vector<grpc::Service*>& services) {
+absl::StatusOr<RunningServer> StartServer(const ServerOptions& options,
+                                          const std::vector<grpc::Service*>& services) {
   RETURN_IF_ERROR(CheckAddress(options));
   static std::once_flag plugins;
   std::call_once(plugins, [] {

@@ -1,11 +1,12 @@
-// How each of our programs serves gRPC: health, reflection, insecure addresses refused, an address in use said.
+// How each of our programs serves gRPC: health, reflection, insecure addresses refused, an address in use
+// said.
 #pragma once
+
+#include <grpcpp/grpcpp.h>
 
 #include <memory>
 #include <string>
 #include <vector>
-
-#include <grpcpp/grpcpp.h>
 
 #include "absl/status/statusor.h"
 
@@ -22,9 +23,11 @@ struct RunningServer {
   std::string address;
 };
 
-// Starts a server with the standard health and reflection services beside `services` (not owned, alive until the server
-// is gone). A stale unix socket that nobody serves is replaced. Errors: InvalidArgument for an address that other
-// machines can reach without allow_insecure, or a socket path that is too long; AlreadyExists where it is in use.
-absl::StatusOr<RunningServer> StartServer(const ServerOptions& options, const std::vector<grpc::Service*>& services);
+// Starts a server with the standard health and reflection services beside `services` (not owned, alive until
+// the server is gone). A stale unix socket that nobody serves is replaced. Errors: InvalidArgument for an
+// address that other machines can reach without allow_insecure, or a socket path that is too long;
+// AlreadyExists where it is in use.
+absl::StatusOr<RunningServer> StartServer(const ServerOptions& options,
+                                          const std::vector<grpc::Service*>& services);
 
 }  // namespace dbr

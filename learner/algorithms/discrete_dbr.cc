@@ -9,7 +9,8 @@ namespace {
 
 BatchNeeds NeedsOf(const AlgorithmConfig& config) {
   const int batch = static_cast<int>(config.batch_size());
-  const int behavior = config.dbr().behavior_batch_size() > 0 ? static_cast<int>(config.dbr().behavior_batch_size()) : batch;
+  const int behavior =
+      config.dbr().behavior_batch_size() > 0 ? static_cast<int>(config.dbr().behavior_batch_size()) : batch;
   return {.uniform = batch, .plus = behavior, .minus = behavior};
 }
 
@@ -33,22 +34,28 @@ DiscreteDbr<Scalar>::DiscreteDbr(const AlgorithmSpec& spec)
       options_(OptionsOf(spec.config.dbr())),
       init_rng_(spec.seed),
       shape_(spec.observation_size, spec.hidden_sizes, spec.actions.size),
+      runner_(static_cast<int>(spec.config.threads())),
       policy_(shape_, spec.config.learning_rate(), /*with_target=*/true, init_rng_),
-      critics_(shape_, spec.config.learning_rate(), init_rng_),
-      beta_plus_(shape_, spec.config.learning_rate(), /*with_target=*/false, init_rng_),
-      beta_minus_(shape_, spec.config.learning_rate(), /*with_target=*/false, init_rng_),
+      critics_(shape_, spec.config.learning_rate(), init_rng_, &runner_),
+      beta_plus_{
+          TrainedNetwork<Scalar>(shape_, spec.config.learning_rate(), /*with_target=*/false, init_rng_),
+          {},
+          {}},
+      beta_minus_{
+          TrainedNetwork<Scalar>(shape_, spec.config.learning_rate(), /*with_target=*/false, init_rng_),
+          {},
+          {}},
       multiplier_(spec.config.dbr().first_multiplier(), spec.config.dbr().multiplier_learning_rate()),
-      metrics_{{"train/critic_loss"},        {"train/actor_loss"},       {"train/beta_plus_loss"},
-               {"train/beta_minus_loss"},    {"train/divergence_plus"},  {"train/divergence_minus"},
-               {"train/threshold"},          {"train/multiplier"},       {"train/policy_entropy"},
-               {"train/value_mean"},         {"train/target_mean"},      {"train/advantage_mean"},
+      metrics_{{"train/critic_loss"},        {"train/actor_loss"},      {"train/beta_plus_loss"},
+               {"train/beta_minus_loss"},    {"train/divergence_plus"}, {"train/divergence_minus"},
+               {"train/threshold"},          {"train/multiplier"},      {"train/policy_entropy"},
+               {"train/value_mean"},         {"train/target_mean"},     {"train/advantage_mean"},
                {"train/advantage_positive"}, {"train/advantage_std"}} {}
 
 template <class Scalar>
 absl::Status DiscreteDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                                          const BasicBatch<Scalar>& minus) {
-  const Scalar loss_plus = FitBehavior(plus, &beta_plus_);
-  const Scalar loss_minus = FitBehavior(minus, &beta_minus_);
+  runner_.Run([&] { FitBehavior(plus, &beta_plus_); }, [&] { FitBehavior(minus, &beta_minus_); });
   ComputeTargets(uniform);
   const Scalar critic_loss = critics_.Fit(uniform.observations, uniform.actions, target_);
   const PolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
@@ -57,16 +64,21 @@ absl::Status DiscreteDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, cons
   critics_.UpdateTargets(spec_.config.target_tau());
   policy_.UpdateTarget(spec_.config.target_tau());
   ++updates_;
-  return Report(loss_plus, loss_minus, critic_loss, policy_loss, uniform);
+  return Report(critic_loss, policy_loss, uniform);
 }
 
 template <class Scalar>
-Scalar DiscreteDbr<Scalar>::FitBehavior(const BasicBatch<Scalar>& batch, TrainedNetwork<Scalar>* behavior) {
-  if (batch.size() == 0) return 0;
-  MaskedSoftmax<Scalar>(behavior->Forward(batch.observations), batch.masks, &fitted_);
-  const Scalar loss = NegativeLogLikelihood<Scalar>(fitted_, batch.actions, &d_logits_);
-  behavior->Step(batch.observations, d_logits_);
-  return loss;
+void DiscreteDbr<Scalar>::FitBehavior(const BasicBatch<Scalar>& batch, Behavior* behavior) {
+  if (batch.size() == 0) return;
+  EvaluateBehavior(batch.observations, batch.masks, behavior);
+  behavior->loss = NegativeLogLikelihood<Scalar>(behavior->distribution, batch.actions, &behavior->d_logits);
+  behavior->network.Step(batch.observations, behavior->d_logits);
+}
+
+template <class Scalar>
+void DiscreteDbr<Scalar>::EvaluateBehavior(const MatrixX<Scalar>& observations, const MatrixX<Scalar>& masks,
+                                           Behavior* behavior) {
+  MaskedSoftmax<Scalar>(behavior->network.Forward(observations), masks, &behavior->distribution);
 }
 
 template <class Scalar>
@@ -75,8 +87,9 @@ void DiscreteDbr<Scalar>::ComputeTargets(const BasicBatch<Scalar>& batch) {
   const auto min_weight = static_cast<Scalar>(spec_.config.dbr().target_min_weight());
   critics_.TargetValue(batch.next_observations, next_pi_, min_weight, &target_);
   if (spec_.config.dbr().value_penalty()) {
-    MaskedSoftmax<Scalar>(beta_plus_.Forward(batch.next_observations), batch.next_masks, &fitted_);
-    Divergence<Scalar>(options_.divergence, static_cast<Scalar>(options_.mmd_sigma), next_pi_, fitted_, &penalty_, nullptr);
+    EvaluateBehavior(batch.next_observations, batch.next_masks, &beta_plus_);
+    Divergence<Scalar>(options_.divergence, static_cast<Scalar>(options_.mmd_sigma), next_pi_,
+                       beta_plus_.distribution, &penalty_, nullptr);
     target_ -= multiplier_.value() * penalty_;
   }
   const auto scale = static_cast<Scalar>(spec_.config.reward_scale());
@@ -85,12 +98,13 @@ void DiscreteDbr<Scalar>::ComputeTargets(const BasicBatch<Scalar>& batch) {
 
 template <class Scalar>
 PolicyLoss<Scalar> DiscreteDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
-  MaskedSoftmax<Scalar>(beta_plus_.Forward(batch.observations), batch.masks, &plus_);
-  MaskedSoftmax<Scalar>(beta_minus_.Forward(batch.observations), batch.masks, &minus_);
+  runner_.Run([&] { EvaluateBehavior(batch.observations, batch.masks, &beta_plus_); },
+              [&] { EvaluateBehavior(batch.observations, batch.masks, &beta_minus_); });
   MaskedSoftmax<Scalar>(policy_.Forward(batch.observations), batch.masks, &pi_);
   options_.use_q = updates_ >= spec_.config.dbr().warm_start_updates();
-  const PolicyLoss<Scalar> loss = DualBehaviorPolicyLoss<Scalar>(options_, pi_, critics_.q1(), critics_.q2(), plus_, minus_,
-                                                                 multiplier_.value(), &workspace_, &d_logits_);
+  const PolicyLoss<Scalar> loss =
+      DualBehaviorPolicyLoss<Scalar>(options_, pi_, critics_.q1(), critics_.q2(), beta_plus_.distribution,
+                                     beta_minus_.distribution, multiplier_.value(), &workspace_, &d_logits_);
   policy_.Step(batch.observations, d_logits_);
   return loss;
 }
@@ -110,14 +124,15 @@ void DiscreteDbr<Scalar>::ComputeAdvantages(const BasicBatch<Scalar>& batch) {
 }
 
 template <class Scalar>
-absl::Status DiscreteDbr<Scalar>::Report(Scalar loss_plus, Scalar loss_minus, Scalar critic_loss,
-                                         const PolicyLoss<Scalar>& policy_loss, const BasicBatch<Scalar>& batch) {
-  const Eigen::Map<const Eigen::ArrayXf> advantages(advantages_.data(), static_cast<Eigen::Index>(advantages_.size()));
+absl::Status DiscreteDbr<Scalar>::Report(Scalar critic_loss, const PolicyLoss<Scalar>& policy_loss,
+                                         const BasicBatch<Scalar>& batch) {
+  const Eigen::Map<const Eigen::ArrayXf> advantages(advantages_.data(),
+                                                    static_cast<Eigen::Index>(advantages_.size()));
   const double mean = advantages.mean();
   const double values[] = {critic_loss,
                            policy_loss.loss,
-                           loss_plus,
-                           loss_minus,
+                           beta_plus_.loss,
+                           beta_minus_.loss,
                            policy_loss.divergence_plus,
                            policy_loss.divergence_minus,
                            policy_loss.threshold,
@@ -131,8 +146,9 @@ absl::Status DiscreteDbr<Scalar>::Report(Scalar loss_plus, Scalar loss_minus, Sc
   for (std::size_t i = 0; i < metrics_.size(); ++i) {
     metrics_[i].value = values[i];
     if (!std::isfinite(values[i])) {
-      return absl::InternalError(absl::StrCat("update ", updates_, ": ", metrics_[i].name,
-                                              " is not finite. Resume from the last checkpoint with a smaller learning_rate."));
+      return absl::InternalError(
+          absl::StrCat("update ", updates_, ": ", metrics_[i].name,
+                       " is not finite. Resume from the last checkpoint with a smaller learning_rate."));
     }
   }
   return absl::OkStatus();
@@ -165,16 +181,16 @@ void DiscreteDbr<Scalar>::ExportPolicy(PolicySnapshot* snapshot) const {
   add(kPolicyNetwork, policy_.parameters());
   add(kCritic1, critics_.first().parameters());
   add(kCritic2, critics_.second().parameters());
-  add(kBetaPlus, beta_plus_.parameters());
-  add(kBetaMinus, beta_minus_.parameters());
+  add(kBetaPlus, beta_plus_.network.parameters());
+  add(kBetaMinus, beta_minus_.network.parameters());
 }
 
 template <class Scalar>
 void DiscreteDbr<Scalar>::Save(TensorFile* file) const {
   policy_.Save(kPolicyNetwork, file);
   critics_.Save(file);
-  beta_plus_.Save(kBetaPlus, file);
-  beta_minus_.Save(kBetaMinus, file);
+  beta_plus_.network.Save(kBetaPlus, file);
+  beta_minus_.network.Save(kBetaMinus, file);
   multiplier_.Save(file);
   PutCounter("dbr.updates", updates_, file);
 }
@@ -183,8 +199,8 @@ template <class Scalar>
 absl::Status DiscreteDbr<Scalar>::Load(const TensorFile& file) {
   absl::Status status = policy_.Load(kPolicyNetwork, file);
   status.Update(critics_.Load(file));
-  status.Update(beta_plus_.Load(kBetaPlus, file));
-  status.Update(beta_minus_.Load(kBetaMinus, file));
+  status.Update(beta_plus_.network.Load(kBetaPlus, file));
+  status.Update(beta_minus_.network.Load(kBetaMinus, file));
   status.Update(multiplier_.Load(file));
   status.Update(GetCounter("dbr.updates", file, &updates_));
   return status;

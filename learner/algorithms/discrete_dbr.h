@@ -7,25 +7,30 @@
 #include "learner/algorithm.h"
 #include "learner/parts/discrete_losses.h"
 #include "learner/parts/multiplier.h"
+#include "learner/parts/pair_runner.h"
 #include "learner/parts/trained_network.h"
 #include "learner/parts/twin_critic.h"
 
 namespace dbr {
 
-// State: policy pi with target pi', twin critics with targets, the behaviour policies beta+ of D+ and beta- of D-, and a
-// multiplier alpha. One update, with B drawn from D, B+ from D+ and B- from D-:
-//   1. beta+ maximises the mean of log beta+(a|s) over B+, beta- over B- (the definitions below the paper's equation 3;
+// State: policy pi with target pi', twin critics with targets, the behaviour policies beta+ of D+ and beta-
+// of D-, and a multiplier alpha. One update, with B drawn from D, B+ from D+ and B- from D-:
+//   1. beta+ maximises the mean of log beta+(a|s) over B+, beta- over B- (the definitions below the paper's
+//   equation 3;
 //      an empty part skips its step).
-//   2. y = r + discount * V'(s'), V' the expectation under pi' of 0.75 min_i Q'_i + 0.25 max_i Q'_i; each critic
-//      regresses on y. With value_penalty, V' is reduced by alpha * D(pi'(.|s'), beta+(.|s')) (the paper's equation for V
-//      under beta+).
-//   3. pi minimises -E[min_i E_pi Q_i] + alpha * (D(pi, beta+) - c), the dynamic constraint of the paper's section
+//   2. y = r + discount * V'(s'), V' the expectation under pi' of 0.75 min_i Q'_i + 0.25 max_i Q'_i; each
+//   critic
+//      regresses on y. With value_penalty, V' is reduced by alpha * D(pi'(.|s'), beta+(.|s')) (the paper's
+//      equation for V under beta+).
+//   3. pi minimises -E[min_i E_pi Q_i] + alpha * (D(pi, beta+) - c), the dynamic constraint of the paper's
+//   section
 //      "From ARM and BEAR to DBR".
 //   4. alpha ascends on alpha * (D(pi, beta+) - c).
 //   5. Polyak averaging of the critics and of pi.
 //   6. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin, V its expectation under pi.
-// Departures: steps 3 and 6 use the critics' values from before step 2's gradient step, and step 6 the policy's from
-// before step 3's, so that nothing is computed twice. entropy_weight adds the entropy term of discrete SAC to step 3.
+// Departures: steps 3 and 6 use the critics' values from before step 2's gradient step, and step 6 the
+// policy's from before step 3's, so that nothing is computed twice. entropy_weight adds the entropy term of
+// discrete SAC to step 3.
 template <class Scalar>
 class DiscreteDbr {
  public:
@@ -43,11 +48,21 @@ class DiscreteDbr {
   absl::Status Load(const TensorFile& file);
 
  private:
-  Scalar FitBehavior(const BasicBatch<Scalar>& batch, TrainedNetwork<Scalar>* behavior);
+  // A behaviour policy with the workspaces of its fit.
+  struct Behavior {
+    TrainedNetwork<Scalar> network;
+    Categorical<Scalar> distribution;  // at the states of the newest use
+    MatrixX<Scalar> d_logits;          // [actions x n]
+    Scalar loss = 0;                   // mean of -log beta(a|s) in the newest fit
+  };
+
+  static void FitBehavior(const BasicBatch<Scalar>& batch, Behavior* behavior);
+  static void EvaluateBehavior(const MatrixX<Scalar>& observations, const MatrixX<Scalar>& masks,
+                               Behavior* behavior);
   void ComputeTargets(const BasicBatch<Scalar>& batch);
   PolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
   void ComputeAdvantages(const BasicBatch<Scalar>& batch);
-  absl::Status Report(Scalar loss_plus, Scalar loss_minus, Scalar critic_loss, const PolicyLoss<Scalar>& policy_loss,
+  absl::Status Report(Scalar critic_loss, const PolicyLoss<Scalar>& policy_loss,
                       const BasicBatch<Scalar>& batch);
 
   AlgorithmSpec spec_;
@@ -55,14 +70,15 @@ class DiscreteDbr {
   PolicyLossOptions options_;
   Rng init_rng_;
   MlpShape shape_;
+  PairRunner runner_;
   TrainedNetwork<Scalar> policy_;
   TwinCritic<Scalar> critics_;
-  TrainedNetwork<Scalar> beta_plus_;
-  TrainedNetwork<Scalar> beta_minus_;
+  Behavior beta_plus_;
+  Behavior beta_minus_;
   Multiplier<Scalar> multiplier_;
   std::uint64_t updates_ = 0;
 
-  Categorical<Scalar> pi_, next_pi_, plus_, minus_, fitted_;
+  Categorical<Scalar> pi_, next_pi_;
   PolicyLossWorkspace<Scalar> workspace_;
   VectorX<Scalar> target_, penalty_;
   MatrixX<Scalar> d_logits_;

@@ -41,8 +41,8 @@ absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& sp
                                                    spec.actions.discrete() ? "discrete" : "continuous",
                                                    " action space of environment '", spec.env, "'"));
   }
-  return absl::InvalidArgumentError(
-      absl::StrCat("config field 'algorithm' names none: expected one of ", absl::StrJoin(AlgorithmNames(), ", ")));
+  return absl::InvalidArgumentError(absl::StrCat("config field 'algorithm' names none: expected one of ",
+                                                 absl::StrJoin(AlgorithmNames(), ", ")));
 }
 
 }  // namespace dbr

@@ -9,10 +9,12 @@
 namespace dbr {
 namespace {
 
-// Adds -E[min_i sum_a pi Q_i] / scale to the loss and its gradient with respect to pi's probabilities to `gradient`.
+// Adds -E[min_i sum_a pi Q_i] / scale to the loss and its gradient with respect to pi's probabilities to
+// `gradient`.
 template <class Scalar>
-void AddQTerm(const PolicyLossOptions& options, const Categorical<Scalar>& policy, const ConstMatrixRef<Scalar>& q1,
-              const ConstMatrixRef<Scalar>& q2, PolicyLoss<Scalar>* result, MatrixX<Scalar>* gradient) {
+void AddQTerm(const PolicyLossOptions& options, const Categorical<Scalar>& policy,
+              const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar>& q2, PolicyLoss<Scalar>* result,
+              MatrixX<Scalar>* gradient) {
   const Eigen::Index n = q1.cols();
   Scalar sum = 0, size = 0;
   for (Eigen::Index j = 0; j < n; ++j) {
@@ -47,8 +49,8 @@ void ExpectedTargetValue(const Categorical<Scalar>& policy, const ConstMatrixRef
 }
 
 template <class Scalar>
-Scalar CriticLoss(const ConstMatrixRef<Scalar>& q, const ConstMatrixRef<Scalar>& actions, const VectorX<Scalar>& y,
-                  MatrixX<Scalar>* d_q) {
+Scalar CriticLoss(const ConstMatrixRef<Scalar>& q, const ConstMatrixRef<Scalar>& actions,
+                  const VectorX<Scalar>& y, MatrixX<Scalar>* d_q) {
   const Eigen::Index n = q.cols();
   d_q->resize(q.rows(), n);
   d_q->setZero();
@@ -76,9 +78,9 @@ void Divergence(DbrConfig::Divergence kind, Scalar mmd_sigma, const Categorical<
 template <class Scalar>
 PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, const Categorical<Scalar>& policy,
                                           const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar>& q2,
-                                          const Categorical<Scalar>& beta_plus, const Categorical<Scalar>& beta_minus,
-                                          Scalar alpha, PolicyLossWorkspace<Scalar>* workspace,
-                                          MatrixX<Scalar>* d_logits) {
+                                          const Categorical<Scalar>& beta_plus,
+                                          const Categorical<Scalar>& beta_minus, Scalar alpha,
+                                          PolicyLossWorkspace<Scalar>* workspace, MatrixX<Scalar>* d_logits) {
   PolicyLoss<Scalar> result;
   const auto n = static_cast<Scalar>(policy.probabilities.cols());
   d_logits->setZero(policy.probabilities.rows(), policy.probabilities.cols());
@@ -114,16 +116,16 @@ PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, cons
   return result;
 }
 
-#define DBR_INSTANTIATE(Scalar)                                                                                       \
-  template void ExpectedTargetValue<Scalar>(const Categorical<Scalar>&, const ConstMatrixRef<Scalar>&,               \
-                                            const ConstMatrixRef<Scalar>&, Scalar, VectorX<Scalar>*);                \
-  template Scalar CriticLoss<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&,                   \
-                                     const VectorX<Scalar>&, MatrixX<Scalar>*);                                      \
-  template void Divergence<Scalar>(DbrConfig::Divergence, Scalar, const Categorical<Scalar>&,                        \
-                                   const Categorical<Scalar>&, VectorX<Scalar>*, MatrixX<Scalar>*);                  \
-  template PolicyLoss<Scalar> DualBehaviorPolicyLoss<Scalar>(                                                        \
-      const PolicyLossOptions&, const Categorical<Scalar>&, const ConstMatrixRef<Scalar>&,                           \
-      const ConstMatrixRef<Scalar>&, const Categorical<Scalar>&, const Categorical<Scalar>&, Scalar,                 \
+#define DBR_INSTANTIATE(Scalar)                                                                        \
+  template void ExpectedTargetValue<Scalar>(const Categorical<Scalar>&, const ConstMatrixRef<Scalar>&, \
+                                            const ConstMatrixRef<Scalar>&, Scalar, VectorX<Scalar>*);  \
+  template Scalar CriticLoss<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&,     \
+                                     const VectorX<Scalar>&, MatrixX<Scalar>*);                        \
+  template void Divergence<Scalar>(DbrConfig::Divergence, Scalar, const Categorical<Scalar>&,          \
+                                   const Categorical<Scalar>&, VectorX<Scalar>*, MatrixX<Scalar>*);    \
+  template PolicyLoss<Scalar> DualBehaviorPolicyLoss<Scalar>(                                          \
+      const PolicyLossOptions&, const Categorical<Scalar>&, const ConstMatrixRef<Scalar>&,             \
+      const ConstMatrixRef<Scalar>&, const Categorical<Scalar>&, const Categorical<Scalar>&, Scalar,   \
       PolicyLossWorkspace<Scalar>*, MatrixX<Scalar>*);
 
 DBR_INSTANTIATE(float)

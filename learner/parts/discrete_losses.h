@@ -1,4 +1,5 @@
-// The losses of discrete DBR as pure functions with hand-written gradients (docs/algorithms.md maps them to the paper).
+// The losses of discrete DBR as pure functions with hand-written gradients (docs/algorithms.md maps them to
+// the paper).
 #pragma once
 
 #include "core/batch.h"
@@ -14,13 +15,14 @@ template <class Scalar>
 void ExpectedTargetValue(const Categorical<Scalar>& policy, const ConstMatrixRef<Scalar>& q1,
                          const ConstMatrixRef<Scalar>& q2, Scalar min_weight, VectorX<Scalar>* value);
 
-// The mean of (Q(s, a) - y)^2 over the batch and its gradient with respect to q [actions x n]; y is a constant.
+// The mean of (Q(s, a) - y)^2 over the batch and its gradient with respect to q [actions x n]; y is a
+// constant.
 template <class Scalar>
-Scalar CriticLoss(const ConstMatrixRef<Scalar>& q, const ConstMatrixRef<Scalar>& actions, const VectorX<Scalar>& y,
-                  MatrixX<Scalar>* d_q);
+Scalar CriticLoss(const ConstMatrixRef<Scalar>& q, const ConstMatrixRef<Scalar>& actions,
+                  const VectorX<Scalar>& y, MatrixX<Scalar>* d_q);
 
-// [n] D(p, q) of each sample, and where `d_probabilities` is not null the gradient of their sum with respect to p's
-// probabilities [actions x n]. For KL it is log p - log q: the missing +1 vanishes in SoftmaxGradient.
+// [n] D(p, q) of each sample, and where `d_probabilities` is not null the gradient of their sum with respect
+// to p's probabilities [actions x n]. For KL it is log p - log q: the missing +1 vanishes in SoftmaxGradient.
 template <class Scalar>
 void Divergence(DbrConfig::Divergence kind, Scalar mmd_sigma, const Categorical<Scalar>& p,
                 const Categorical<Scalar>& q, VectorX<Scalar>* divergence, MatrixX<Scalar>* d_probabilities);
@@ -49,18 +51,19 @@ struct PolicyLoss {
 // Workspaces of DualBehaviorPolicyLoss; reused from batch to batch.
 template <class Scalar>
 struct PolicyLossWorkspace {
-  MatrixX<Scalar> d_plus, d_minus;                 // [actions x n]
-  VectorX<Scalar> plus, minus, entropy;            // [n]
+  MatrixX<Scalar> d_plus, d_minus;       // [actions x n]
+  VectorX<Scalar> plus, minus, entropy;  // [n]
 };
 
-// DBR's policy loss: -E[min_i sum_a pi Q_i] / scale - w H(pi) + alpha * (D(pi, beta+) - c), c by options.constraint
-// (docs/algorithms.md, DBR step 3), and its gradient with respect to the policy's logits. q1, q2, beta+, beta- and the
-// scale of normalize_q (the mean of |Q| over the batch) are constants; so is c unless repel_negative.
+// DBR's policy loss: -E[min_i sum_a pi Q_i] / scale - w H(pi) + alpha * (D(pi, beta+) - c), c by
+// options.constraint (docs/algorithms.md, DBR step 3), and its gradient with respect to the policy's logits.
+// q1, q2, beta+, beta- and the scale of normalize_q (the mean of |Q| over the batch) are constants; so is c
+// unless repel_negative.
 template <class Scalar>
 PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, const Categorical<Scalar>& policy,
                                           const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar>& q2,
-                                          const Categorical<Scalar>& beta_plus, const Categorical<Scalar>& beta_minus,
-                                          Scalar alpha, PolicyLossWorkspace<Scalar>* workspace,
-                                          MatrixX<Scalar>* d_logits);
+                                          const Categorical<Scalar>& beta_plus,
+                                          const Categorical<Scalar>& beta_minus, Scalar alpha,
+                                          PolicyLossWorkspace<Scalar>* workspace, MatrixX<Scalar>* d_logits);
 
 }  // namespace dbr

@@ -16,10 +16,12 @@ template <class Scalar>
 void PutTensor(const std::string& name, const VectorX<Scalar>& values, TensorFile* file) {
   std::vector<float>& out = file->tensors[name];
   out.resize(static_cast<std::size_t>(values.size()));
-  for (Eigen::Index i = 0; i < values.size(); ++i) out[static_cast<std::size_t>(i)] = static_cast<float>(values[i]);
+  for (Eigen::Index i = 0; i < values.size(); ++i)
+    out[static_cast<std::size_t>(i)] = static_cast<float>(values[i]);
 }
 
-// `values` has the expected size. DataLoss where the tensor is missing, InvalidArgument where its size differs.
+// `values` has the expected size. DataLoss where the tensor is missing, InvalidArgument where its size
+// differs.
 template <class Scalar>
 absl::Status GetTensor(const std::string& name, const TensorFile& file, VectorX<Scalar>* values) {
   const auto found = file.tensors.find(name);
@@ -27,8 +29,9 @@ absl::Status GetTensor(const std::string& name, const TensorFile& file, VectorX<
     return absl::DataLossError(absl::StrCat("the checkpoint has no tensor '", name, "'"));
   }
   if (static_cast<Eigen::Index>(found->second.size()) != values->size()) {
-    return absl::InvalidArgumentError(absl::StrCat("tensor '", name, "': expected ", values->size(), " values, found ",
-                                                   found->second.size(), ". The checkpoint is of other network sizes."));
+    return absl::InvalidArgumentError(absl::StrCat("tensor '", name, "': expected ", values->size(),
+                                                   " values, found ", found->second.size(),
+                                                   ". The checkpoint is of other network sizes."));
   }
   for (Eigen::Index i = 0; i < values->size(); ++i) (*values)[i] = found->second[static_cast<std::size_t>(i)];
   return absl::OkStatus();

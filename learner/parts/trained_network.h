@@ -56,7 +56,9 @@ class TrainedNetwork {
   }
   absl::Status Load(const std::string& name, const TensorFile& file) {
     absl::Status status;
-    Visit(name, [&](const std::string& key, VectorX<Scalar>& values) { status.Update(GetTensor(key, file, &values)); });
+    Visit(name, [&](const std::string& key, VectorX<Scalar>& values) {
+      status.Update(GetTensor(key, file, &values));
+    });
     std::uint64_t steps = 0;
     status.Update(GetCounter(name + ".adam.steps", file, &steps));
     adam_.set_steps(steps);

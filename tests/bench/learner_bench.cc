@@ -1,4 +1,5 @@
-// Updates of the algorithms beside the matrix product that limits them; `flops` is useful operations a second.
+// Updates of the algorithms beside the matrix product that limits them; `flops` is useful operations a
+// second.
 #include <benchmark/benchmark.h>
 
 #include "core/rng.h"
@@ -10,7 +11,8 @@ namespace {
 
 // A batch of random boards with their legal actions; rewards at a tenth of the transitions.
 void FillBatch(const AlgorithmSpec& spec, int n, Rng& rng, Batch* batch) {
-  batch->Resize({spec.observation_size, spec.actions.width(), spec.actions.mask_width()}, n, /*with_keys=*/false);
+  batch->Resize({spec.observation_size, spec.actions.width(), spec.actions.mask_width()}, n,
+                /*with_keys=*/false);
   const auto bit = [&](float) { return rng.Below(4) == 0 ? 1.0f : 0.0f; };
   batch->observations = batch->observations.unaryExpr(bit);
   batch->next_observations = batch->next_observations.unaryExpr(bit);
@@ -49,11 +51,11 @@ void LearnerUpdate(benchmark::State& state, const AlgorithmSpec& spec) {
       return state.SkipWithError(std::string(status.message()).c_str());
     }
   }
-  state.counters["flops"] = benchmark::Counter((*algorithm)->UpdateFlops() * static_cast<double>(state.iterations()),
-                                               benchmark::Counter::kIsRate);
+  state.counters["flops"] = benchmark::Counter(
+      (*algorithm)->UpdateFlops() * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
   state.SetItemsProcessed(state.iterations());
 }
-BENCHMARK_CAPTURE(LearnerUpdate, dbr/connect4, Connect4Spec())->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(LearnerUpdate, dbr / connect4, Connect4Spec())->Unit(benchmark::kMillisecond);
 
 // The limit: a product of two square matrices in single precision.
 void Sgemm(benchmark::State& state) {
@@ -66,8 +68,8 @@ void Sgemm(benchmark::State& state) {
     benchmark::DoNotOptimize(c.data());
     benchmark::ClobberMemory();
   }
-  state.counters["flops"] = benchmark::Counter(2.0 * kSize * kSize * kSize * static_cast<double>(state.iterations()),
-                                               benchmark::Counter::kIsRate);
+  state.counters["flops"] = benchmark::Counter(
+      2.0 * kSize * kSize * kSize * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
 }
 BENCHMARK(Sgemm)->Name("Sgemm/256x256x256");
 

@@ -1,5 +1,5 @@
-// The MLP, Adam, the categorical policy and acting: against reference values of PyTorch in double, and against central
-// differences.
+// The MLP, Adam, the categorical policy and acting: against reference values of PyTorch in double, and
+// against central differences.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -74,10 +74,12 @@ TEST_P(MlpDepth, GradientsAgreeWithDifferences) {
   MlpForward<double>(shape, parameters.data(), x, &activations);
   Vector gradient;
   MlpParameterGradient<double>(shape, parameters.data(), x, dy, &activations, &gradient);
-  ExpectIsGradient(gradient, [&](const Matrix& p) { return loss(p.data(), x); }, parameters);
+  ExpectIsGradient(
+      gradient, [&](const Matrix& p) { return loss(p.data(), x); }, parameters);
   Matrix dx;
   MlpInputGradient<double>(shape, parameters.data(), dy, &activations, &dx);
-  ExpectIsGradient(dx, [&](const Matrix& input) { return loss(parameters.data(), input); }, x);
+  ExpectIsGradient(
+      dx, [&](const Matrix& input) { return loss(parameters.data(), input); }, x);
 }
 
 INSTANTIATE_TEST_SUITE_P(Depths, MlpDepth,
@@ -154,13 +156,14 @@ TEST(MaskedCategorical, LikelihoodGradientAgreesWithDifferences) {
   Matrix gradient;
   NegativeLogLikelihood<double>(p, actions, &gradient);
   EXPECT_EQ(gradient(2, 0), 0);
-  ExpectIsGradient(gradient,
-                   [&](const Matrix& z) {
-                     Categorical<double> moved;
-                     MaskedSoftmax<double>(z, mask, &moved);
-                     return NegativeLogLikelihood<double>(moved, actions, nullptr);
-                   },
-                   logits);
+  ExpectIsGradient(
+      gradient,
+      [&](const Matrix& z) {
+        Categorical<double> moved;
+        MaskedSoftmax<double>(z, mask, &moved);
+        return NegativeLogLikelihood<double>(moved, actions, nullptr);
+      },
+      logits);
 }
 
 TEST(MaskedCategorical, AColumnWithoutLegalActionsIsZero) {
@@ -189,7 +192,11 @@ std::vector<float> Constant(const std::vector<float>& outputs) {
 PolicySnapshot FourChoices() {
   PolicySnapshot snapshot;
   snapshot.version = 1;
-  snapshot.spec = {.env = "test", .algorithm = "dbr", .observation_size = 1, .actions = {ActionKind::kDiscrete, 4}, .hidden_sizes = {}};
+  snapshot.spec = {.env = "test",
+                   .algorithm = "dbr",
+                   .observation_size = 1,
+                   .actions = {ActionKind::kDiscrete, 4},
+                   .hidden_sizes = {}};
   const auto logs = [](std::vector<float> p) {
     for (float& x : p) x = std::log(x);
     return Constant(p);
@@ -266,7 +273,8 @@ TEST_F(Acting, ANetworkOfAnotherSizeIsRefusedByName) {
   snapshot_.networks[2].second.pop_back();
   const auto policy = PolicyNetworks::Create(snapshot_);
   EXPECT_THAT(std::string(policy.status().message()),
-              testing::AllOf(testing::HasSubstr("critic_2"), testing::HasSubstr("expected 8"), testing::HasSubstr("found 7")));
+              testing::AllOf(testing::HasSubstr("critic_2"), testing::HasSubstr("expected 8"),
+                             testing::HasSubstr("found 7")));
 }
 
 TEST_F(Acting, ValuesThatAreNotFiniteAreAnError) {

@@ -1,0 +1,221 @@
+// The actor between a real replay server and the learner's side of the wire, over unix sockets.
+#include "actor/actor.h"
+
+#include <cmath>
+#include <thread>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "replay/client.h"
+#include "replay/replay_server.h"
+#include "tests/actor/learner_double.h"
+#include "tests/actor/line_env.h"
+#include "tests/actor/test_policies.h"
+
+namespace dbr {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+constexpr absl::Duration kLong = absl::Seconds(30);  // reached only where something is wrong
+
+// As many transitions are drawn as are inserted, so that a draw is a way to wait for inserts.
+constexpr int kDrawn = 1000;
+
+class ActorTest : public ::testing::Test {
+ protected:
+  ActorTest() : client_(replay_address_) {
+    config_.mutable_network()->add_hidden_sizes(16);
+    config_.mutable_network()->add_hidden_sizes(16);
+    config_.mutable_actor()->set_envs(8);
+    config_.mutable_actor()->set_buffered_transitions(500);
+    config_.mutable_actor()->set_batch_bytes(4096);
+    config_.mutable_replay()->set_capacity(50000);
+    config_.mutable_replay()->set_min_size(100);
+    config_.mutable_replay()->set_samples_per_insert(1);
+    config_.mutable_replay()->set_tolerance(kDrawn);
+  }
+
+  std::unique_ptr<ReplayServer> StartReplay(const EnvSpec& env, bool resume = false) const {
+    ReplayServerOptions options = OptionsFrom(config_, TransitionLayout::Of(env));
+    options.store.path = folder_.path() + "/replay.store";
+    options.store.env = env.name;
+    options.store.resume = resume;
+    options.server.address = replay_address_;
+    return ReplayServer::Start(options).value();
+  }
+
+  std::unique_ptr<Actor> MakeActor(absl::Duration drain_timeout = kLong) const {
+    return Actor::Create({.config = config_,
+                          .index = 3,
+                          .replay_address = replay_address_,
+                          .learner_address = learner_address_,
+                          .drain_timeout = drain_timeout})
+        .value();
+  }
+
+  // Draws until `inserted` transitions have come; false where that takes too long.
+  bool AwaitInserted(std::uint64_t inserted) {
+    DrawnBatches drawn;
+    const TransitionLayout layout = TransitionLayout::Of(Connect4Spec());
+    do {
+      const absl::Status status = client_.Sample({.uniform = kDrawn}, layout, kLong, &drawn);
+      if (!status.ok()) {
+        ADD_FAILURE() << status;
+        return false;
+      }
+    } while (drawn.inserted < inserted);
+    return true;
+  }
+
+  // What the server holds of one writer that has written `written`: each once.
+  static void ExpectEachOnce(const BufferStats& stats, std::uint64_t written) {
+    ASSERT_THAT(stats.writers, SizeIs(1));
+    EXPECT_EQ(stats.total, written);
+    EXPECT_EQ(stats.writers[0].held, written);
+    EXPECT_EQ(stats.writers[0].inserted, written);
+    EXPECT_EQ(stats.writers[0].last_sequence, written);
+    EXPECT_EQ(stats.evicted, 0);
+    EXPECT_EQ(stats.writers[0].refused, 0);
+  }
+
+  SocketFolder folder_;
+  const std::string replay_address_ = folder_.Address("replay");
+  const std::string learner_address_ = folder_.Address("learner");
+  Config config_;
+  ReplayClient client_;
+};
+
+TEST_F(ActorTest, AllThatTheStepLoopSaysArrivesOnce) {
+  const EnvSpec env = LineEnv().spec();
+  config_.mutable_replay()->set_samples_per_insert(0);
+  const auto server = StartReplay(env);
+  TransitionWriter writer({.address = replay_address_,
+                           .name = "actor-0",
+                           .layout = TransitionLayout::Of(env),
+                           .batch_bytes = 1024,
+                           .buffered_transitions = 300});
+  std::uint64_t episodes = 0, plus = 0, minus = 0, unjudged = 0;
+  double returns = 0;
+  StepLoop loop(MakeLines(10), {.epsilon = 0.2}, Rng(1),
+                [&](const TransitionView& transition, float advantage, std::uint64_t version,
+                    const std::optional<EpisodeEnd>& end) {
+                  plus += advantage >= 0;
+                  minus += advantage <= 0;
+                  unjudged += std::isnan(advantage);
+                  episodes += end.has_value();
+                  if (end.has_value()) returns += end->episode_return;
+                  return writer.Append(transition, advantage, version, end, kLong);
+                });
+  // The critics come later, as in an algorithm that starts without them. Fewer than the 1,000 episodes that
+  // stats cover.
+  const auto blind = UntrainedPolicy(env, 1, /*with_critics=*/false), judging = UntrainedPolicy(env, 2);
+  for (int step = 0; step < 200; ++step) ASSERT_TRUE(loop.Step(step < 50 ? *blind : *judging).ok());
+  ASSERT_TRUE(writer.Flush(kLong).ok());
+
+  const BufferStats stats = server->buffer().Stats();
+  ExpectEachOnce(stats, 2000);
+  EXPECT_EQ(stats.counters.duplicates, 0);
+  EXPECT_EQ(stats.plus, plus);
+  EXPECT_EQ(stats.minus, minus);
+  EXPECT_EQ(stats.unjudged, unjudged);
+  EXPECT_EQ(unjudged, 500);
+  EXPECT_EQ(stats.counters.episodes, episodes);
+  EXPECT_EQ(loop.counters().episodes, episodes);
+  EXPECT_NEAR(stats.recent_return_mean, returns / episodes, 1e-3);
+  EXPECT_TRUE(std::isnan(stats.recent_score_mean));
+  EXPECT_EQ(stats.counters.newest_label, 2);
+}
+
+TEST_F(ActorTest, WritesUntilItIsStoppedAndLeavesNothingBehind) {
+  const auto server = StartReplay(Connect4Spec());
+  LearnerDouble learner(learner_address_);
+  learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
+  const auto actor = MakeActor();
+  absl::Status status = absl::UnknownError("not run");
+  std::thread running([&] { status = actor->Run(); });
+  EXPECT_TRUE(AwaitInserted(3000));
+  actor->Stop();
+  EXPECT_TRUE(AwaitInserted(actor->counters().appended));
+  running.join();
+  EXPECT_TRUE(status.ok()) << status;
+  EXPECT_EQ(actor->counters().acknowledged, actor->counters().appended);
+  const BufferStats stats = server->buffer().Stats();
+  ExpectEachOnce(stats, actor->counters().appended);
+  EXPECT_EQ(stats.writers[0].identity.name, "actor-3");
+  EXPECT_EQ(stats.unjudged, 0);
+  EXPECT_EQ(stats.recent_return_mean, 2 * stats.recent_score_mean - 1);
+}
+
+TEST_F(ActorTest, GoesOnWhenTheLearnerAndTheReplayServerGoAwayAndComeBack) {
+  auto server = StartReplay(Connect4Spec());
+  auto learner = std::make_unique<LearnerDouble>(learner_address_);
+  learner->Offer(Encode(UntrainedSnapshot(Connect4Spec(), 5)));
+  const auto actor = MakeActor();
+  absl::Status status = absl::UnknownError("not run");
+  std::thread running([&] { status = actor->Run(); });
+  EXPECT_TRUE(AwaitInserted(2000));
+
+  learner.reset();
+  EXPECT_TRUE(AwaitInserted(4000));
+
+  ASSERT_TRUE(server->Stop().ok());
+  server.reset();
+  server = StartReplay(Connect4Spec(), /*resume=*/true);
+  EXPECT_TRUE(AwaitInserted(8000));
+
+  learner = std::make_unique<LearnerDouble>(learner_address_);
+  learner->Offer(Encode(UntrainedSnapshot(Connect4Spec(), 6)));
+  while (server->buffer().Stats().counters.newest_label < 6) ASSERT_TRUE(AwaitInserted(0));
+
+  actor->Stop();
+  EXPECT_TRUE(AwaitInserted(actor->counters().appended));
+  running.join();
+  EXPECT_TRUE(status.ok()) << status;
+  EXPECT_EQ(actor->counters().reconnects, 1);
+  EXPECT_EQ(actor->counters().acknowledged, actor->counters().appended);
+  ExpectEachOnce(server->buffer().Stats(), actor->counters().appended);
+}
+
+TEST_F(ActorTest, StopsWithinItsDeadlineWhileTheReplayServerIsAway) {
+  LearnerDouble learner(learner_address_);
+  learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
+  const auto actor = MakeActor(/*drain_timeout=*/absl::Milliseconds(10));
+  absl::Status status = absl::UnknownError("not run");
+  std::thread running([&] { status = actor->Run(); });
+  const absl::Time deadline = absl::Now() + kLong;
+  while (actor->counters().appended < 500 && absl::Now() < deadline) std::this_thread::yield();
+  actor->Stop();
+  running.join();
+  EXPECT_TRUE(status.ok()) << status;
+  EXPECT_EQ(actor->counters().appended, 500) << "as many as it may buffer";
+  EXPECT_EQ(actor->counters().acknowledged, 0);
+}
+
+TEST_F(ActorTest, EndsWithTheErrorOfAPolicyForSomethingElse) {
+  LearnerDouble learner(learner_address_);
+  learner.Offer(Encode(UntrainedSnapshot(LineEnv().spec(), 1)));
+  const absl::Status status = MakeActor()->Run();
+  EXPECT_TRUE(absl::IsInvalidArgument(status)) << status;
+  EXPECT_THAT(std::string(status.message()), HasSubstr("env: expected connect4, found line"));
+}
+
+TEST_F(ActorTest, EndsWithTheErrorOfAReplayServerForSomethingElse) {
+  const auto server = StartReplay(LineEnv().spec());
+  LearnerDouble learner(learner_address_);
+  learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
+  const absl::Status status = MakeActor()->Run();
+  EXPECT_TRUE(absl::IsInvalidArgument(status)) << status;
+  EXPECT_THAT(std::string(status.message()), HasSubstr("observation_width"));
+}
+
+TEST_F(ActorTest, RefusesAnUnknownOpponent) {
+  config_.mutable_env()->add_opponents("nobody");
+  const absl::Status status = Actor::Create({.config = config_}).status();
+  EXPECT_TRUE(absl::IsInvalidArgument(status)) << status;
+  EXPECT_THAT(std::string(status.message()), HasSubstr("nobody"));
+}
+
+}  // namespace
+}  // namespace dbr

@@ -1,0 +1,120 @@
+#include "actor/evaluation_loop.h"
+
+#include <map>
+#include <utility>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "tests/actor/test_policies.h"
+
+namespace dbr {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using ::testing::Pair;
+
+// The loop with a clock of its own: each wait moves the time to the deadline and then plays the script's next
+// entry.
+class EvaluationLoopTest : public ::testing::Test {
+ protected:
+  EvaluationLoopTest()
+      : loop_({.opponents = {"random", "one_ply"}, .episodes = 4, .seed = 1, .every = absl::Seconds(10)},
+              Ports()) {}
+
+  EvaluationLoopPorts Ports() {
+    return {.newest_policy = [this] { return newest_; },
+            .report = [this](const EvaluationReport& report) { return Report(report); },
+            .now = [this] { return now_; },
+            .wait_until =
+                [this](absl::Time deadline) {
+                  waits_.push_back(deadline - now_);
+                  now_ = std::max(now_, deadline);
+                  if (script_.empty()) return loop_.Close();
+                  const auto next = std::move(script_.front());
+                  script_.pop_front();
+                  next();
+                }};
+  }
+
+  absl::Status Report(const EvaluationReport& report) {
+    now_ += time_of_a_report_;
+    ++attempts_;
+    if (!learner_.ok()) return learner_;
+    reports_.emplace_back(report.policy_version(), report.opponent());
+    return absl::OkStatus();
+  }
+
+  void Push(std::uint64_t version) { newest_ = UntrainedPolicy(Connect4Spec(), version); }
+
+  absl::Time now_ = absl::UnixEpoch();
+  absl::Duration time_of_a_report_ = absl::ZeroDuration();
+  absl::StatusOr<std::shared_ptr<const PolicyNetworks>> newest_ = nullptr;
+  absl::Status learner_;
+  int attempts_ = 0;
+  std::vector<std::pair<std::uint64_t, std::string>> reports_;
+  std::vector<absl::Duration> waits_;
+  std::deque<std::function<void()>> script_;
+  EvaluationLoop loop_;
+};
+
+TEST_F(EvaluationLoopTest, EvaluatesEachNewPolicyOnceAgainstEachOpponent) {
+  script_ = {[&] { Push(3); }, [] {}, [&] { Push(4); }, [] {}};
+  ASSERT_TRUE(loop_.Run().ok());
+  EXPECT_THAT(reports_,
+              ElementsAre(Pair(3, "random"), Pair(3, "one_ply"), Pair(4, "random"), Pair(4, "one_ply")));
+}
+
+TEST_F(EvaluationLoopTest, EvaluatesALowerVersionOfALearnerThatStartedAnew) {
+  Push(7);
+  script_ = {[&] { Push(2); }};
+  ASSERT_TRUE(loop_.Run().ok());
+  EXPECT_THAT(reports_,
+              ElementsAre(Pair(7, "random"), Pair(7, "one_ply"), Pair(2, "random"), Pair(2, "one_ply")));
+}
+
+TEST_F(EvaluationLoopTest, KeepsItsDeadlinesAndCatchesUpAfterALongRound) {
+  Push(1);
+  time_of_a_report_ = absl::Seconds(3);
+  script_ = {[] {},
+             [&] {
+               Push(2);
+               time_of_a_report_ = absl::Seconds(11);
+             }};
+  ASSERT_TRUE(loop_.Run().ok());
+  // 6 of 10 s went into the first round, none into the second, 22 into the third.
+  EXPECT_THAT(waits_, ElementsAre(absl::Seconds(4), absl::Seconds(10), absl::ZeroDuration()));
+}
+
+TEST_F(EvaluationLoopTest, KeepsReportsWhileThereIsNoLearner) {
+  Push(1);
+  learner_ = absl::UnavailableError("nobody there");
+  script_ = {[&] { Push(2); }, [&] { learner_ = absl::OkStatus(); }};
+  ASSERT_TRUE(loop_.Run().ok());
+  EXPECT_THAT(reports_,
+              ElementsAre(Pair(1, "random"), Pair(1, "one_ply"), Pair(2, "random"), Pair(2, "one_ply")));
+}
+
+TEST_F(EvaluationLoopTest, DropsReportsThatTheLearnerRefuses) {
+  Push(1);
+  learner_ = absl::InvalidArgumentError("unknown opponent");
+  script_ = {[&] { learner_ = absl::OkStatus(); }};
+  ASSERT_TRUE(loop_.Run().ok());
+  EXPECT_THAT(reports_, IsEmpty());
+  EXPECT_EQ(attempts_, 2);
+}
+
+TEST_F(EvaluationLoopTest, EndsWithTheErrorOfItsPolicies) {
+  newest_ = absl::InvalidArgumentError("another environment");
+  EXPECT_TRUE(absl::IsInvalidArgument(loop_.Run()));
+}
+
+TEST(OpponentsToEvaluateTest, PrefersTheConfigAndKnowsEnvironmentsWithoutOpponents) {
+  EXPECT_THAT(OpponentsToEvaluate("connect4", {"mcts:7"}), ElementsAre("mcts:7"));
+  EXPECT_EQ(OpponentsToEvaluate("connect4", {}), EvaluationOpponents("connect4"));
+  EXPECT_THAT(OpponentsToEvaluate("line", {}), ElementsAre(""));
+}
+
+}  // namespace
+}  // namespace dbr

@@ -1,0 +1,186 @@
+// The program dbr-actor as a process: its exit codes, its error lines and its end on a signal.
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "absl/strings/match.h"
+#include "absl/time/clock.h"
+#include "core/check.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "tests/actor/learner_double.h"
+#include "tests/actor/test_policies.h"
+
+namespace dbr {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr absl::Duration kLong = absl::Seconds(30);  // reached only where something is wrong
+
+// dbr-actor with its standard error read by us. It runs without OPENBLAS_NUM_THREADS, as users start it:
+// OpenBLAS then has threads of its own before main.
+class Program {
+ public:
+  explicit Program(std::vector<std::string> arguments) {
+    int ends[2];
+    DBR_CHECK(pipe2(ends, O_CLOEXEC) == 0);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
+    arguments.insert(arguments.begin(), absl::StrCat(DBR_BIN_DIR, "/dbr-actor"));
+    std::vector<char*> argv, envp;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    for (char** entry = environ; *entry != nullptr; ++entry) {
+      if (!absl::StartsWith(*entry, "OPENBLAS_NUM_THREADS=")) envp.push_back(*entry);
+    }
+    envp.push_back(nullptr);
+    DBR_CHECK(posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), envp.data()) == 0);
+    posix_spawn_file_actions_destroy(&actions);
+    close(ends[1]);
+    output_fd_ = ends[0];
+  }
+  ~Program() {
+    if (pid_ > 0) {
+      kill(pid_, SIGKILL);
+      waitpid(pid_, nullptr, 0);
+    }
+    close(output_fd_);
+  }
+
+  // Reads until `words` have come; false where the output ended or took too long.
+  bool AwaitOutput(const std::string& words) {
+    while (!absl::StrContains(output_, words)) {
+      if (!ReadMore()) return false;
+    }
+    return true;
+  }
+  void Signal(int number) { kill(pid_, number); }
+
+  // Reads to the end; gives the exit code, or minus the signal that killed it.
+  int Wait() {
+    while (ReadMore()) continue;
+    int status = 0;
+    waitpid(pid_, &status, 0);
+    pid_ = 0;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+  const std::string& output() const { return output_; }
+
+ private:
+  bool ReadMore() {
+    pollfd fd = {output_fd_, POLLIN, 0};
+    const absl::Duration left = deadline_ - absl::Now();
+    if (left <= absl::ZeroDuration() ||
+        poll(&fd, 1, static_cast<int>(absl::ToInt64Milliseconds(left)) + 1) <= 0) {
+      kill(pid_, SIGKILL);
+      return false;
+    }
+    char bytes[4096];
+    const ssize_t count = read(output_fd_, bytes, sizeof bytes);
+    if (count > 0) output_.append(bytes, count);
+    return count > 0;
+  }
+
+  const absl::Time deadline_ = absl::Now() + kLong;
+  pid_t pid_ = 0;
+  int output_fd_ = -1;
+  std::string output_;
+};
+
+class ProgramTest : public ::testing::Test {
+ protected:
+  std::string WriteConfig(const std::string& text) const {
+    const std::string path = folder_.path() + "/config.textproto";
+    std::ofstream(path) << text;
+    return path;
+  }
+  std::vector<std::string> Flags(const std::string& config) const {
+    return {"--config", WriteConfig(config), "--run-dir", folder_.path()};
+  }
+  std::vector<std::string> EvaluatorFlags(const std::string& config) const {
+    std::vector<std::string> flags = Flags(config);
+    flags.push_back("--evaluate");
+    return flags;
+  }
+
+  SocketFolder folder_;
+};
+
+constexpr char kSmall[] = "network { hidden_sizes: [16, 16] } actor { envs: 4 }";
+
+TEST_F(ProgramTest, BadUsageExitsWith2) {
+  Program unknown({"--no-such-flag"});
+  EXPECT_EQ(unknown.Wait(), 2);
+  Program incomplete({"--index", "1"});
+  EXPECT_EQ(incomplete.Wait(), 2);
+  EXPECT_THAT(incomplete.output(), HasSubstr("--config"));
+}
+
+TEST_F(ProgramTest, BadConfigExitsWith2AndNamesTheField) {
+  Program program(Flags("actor { envs: 0 }"));
+  EXPECT_EQ(program.Wait(), 2);
+  EXPECT_THAT(program.output(), HasSubstr("actor.envs"));
+
+  Program other(Flags("env { name: 'chess' }"));
+  EXPECT_EQ(other.Wait(), 2);
+  EXPECT_THAT(other.output(), HasSubstr("chess"));
+
+  Program evaluator(EvaluatorFlags("evaluation { opponents: 'nobody' }"));
+  EXPECT_EQ(evaluator.Wait(), 2);
+  EXPECT_THAT(evaluator.output(), HasSubstr("nobody"));
+}
+
+TEST_F(ProgramTest, EndsCleanlyOnASignalWhileThereIsNoLearner) {
+  for (const int signal_number : {SIGTERM, SIGINT}) {
+    Program actor(Flags(kSmall));
+    ASSERT_TRUE(actor.AwaitOutput("no policies from the learner")) << actor.output();
+    actor.Signal(signal_number);
+    EXPECT_EQ(actor.Wait(), 0) << actor.output();
+
+    Program evaluator(EvaluatorFlags(kSmall));
+    ASSERT_TRUE(evaluator.AwaitOutput("no policies from the learner")) << evaluator.output();
+    evaluator.Signal(signal_number);
+    EXPECT_EQ(evaluator.Wait(), 0) << evaluator.output();
+  }
+}
+
+TEST_F(ProgramTest, APolicyOfOtherSizesExitsWith1) {
+  LearnerDouble learner(folder_.Address("learner"));
+  learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
+  Program actor(Flags("network { hidden_sizes: [32, 16] } actor { envs: 4 }"));
+  EXPECT_EQ(actor.Wait(), 1);
+  EXPECT_THAT(actor.output(), HasSubstr("hidden_sizes: expected 32-16, found 16-16"));
+}
+
+TEST_F(ProgramTest, EvaluatorReportsToTheLearnerUntilItIsStopped) {
+  LearnerDouble learner(folder_.Address("learner"));
+  learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 7)));
+  Program evaluator(EvaluatorFlags(std::string(kSmall) +
+                                   "evaluation { opponents: ['random', 'mcts:5'] episodes: 6 every_s: 1 }"));
+  ASSERT_TRUE(learner.AwaitReports(2, kLong));
+  evaluator.Signal(SIGTERM);
+  EXPECT_EQ(evaluator.Wait(), 0) << evaluator.output();
+  const std::vector<EvaluationReport> reports = learner.reports();
+  EXPECT_EQ(reports[0].opponent(), "random");
+  EXPECT_EQ(reports[1].opponent(), "mcts:5");
+  for (const EvaluationReport& report : reports) {
+    EXPECT_EQ(report.policy_version(), 7);
+    EXPECT_EQ(report.updates(), 70);
+    EXPECT_EQ(report.env(), "connect4");
+    EXPECT_EQ(report.episodes(), 6);
+    EXPECT_NEAR(report.return_mean(), 2 * report.score_mean() - 1, 1e-12);
+    EXPECT_GE(report.score_stderr(), 0);
+  }
+}
+
+}  // namespace
+}  // namespace dbr

@@ -1,0 +1,181 @@
+#include "actor/step_loop.h"
+
+#include <cmath>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "tests/actor/line_env.h"
+#include "tests/actor/test_policies.h"
+
+namespace dbr {
+namespace {
+
+using Floats = std::vector<float>;
+
+constexpr int kEnvs = 6;
+constexpr int kSteps = 40;
+
+// A transition as the sink saw it.
+struct Seen {
+  Floats observation, action, mask, next_observation, next_mask;
+  float reward, discount, advantage;
+  std::uint64_t critic_version;
+  std::optional<EpisodeEnd> end;
+
+  float seed() const { return observation[0]; }
+  float step() const { return observation[1]; }
+};
+
+Floats Copy(absl::Span<const float> span) {
+  return {span.begin(), span.end()};
+}
+
+TransitionSink Into(std::vector<Seen>* seen) {
+  return [seen](const TransitionView& t, float advantage, std::uint64_t version,
+                const std::optional<EpisodeEnd>& end) {
+    seen->push_back({Copy(t.observation), Copy(t.action), Copy(t.mask), Copy(t.next_observation),
+                     Copy(t.next_mask), t.reward, t.discount, advantage, version, end});
+    return absl::OkStatus();
+  };
+}
+
+// kSteps steps in kEnvs lines by one policy; entry [step * kEnvs + i] belongs to environment i.
+std::vector<Seen> Walk(const StepLoopOptions& options, std::uint64_t seed, bool with_critics = true) {
+  std::vector<Seen> seen;
+  StepLoop loop(MakeLines(kEnvs), options, Rng(seed), Into(&seen));
+  const auto policy = UntrainedPolicy(LineEnv().spec(), 5, with_critics);
+  for (int step = 0; step < kSteps; ++step) EXPECT_TRUE(loop.Step(*policy).ok());
+  EXPECT_EQ(loop.counters().transitions, seen.size());
+  return seen;
+}
+
+TEST(StepLoopTest, BootstrapsWhereAnEpisodeIsCutAndNotWhereItTerminates) {
+  int terminated = 0, cut = 0;
+  for (const Seen& t : Walk({.discount = 0.9}, 1)) {
+    const auto seed = static_cast<std::uint64_t>(t.seed());
+    // seed % 1000 keeps seed % 2 and seed % 4.
+    const bool last = t.step() + 1 == static_cast<float>(LineEnv::LengthOf(seed));
+    ASSERT_EQ(t.end.has_value(), last);
+    const bool terminal = last && !LineEnv::IsCut(seed);
+    EXPECT_EQ(t.discount, terminal ? 0.0f : 0.9f);
+    terminated += terminal;
+    cut += last && !terminal;
+  }
+  EXPECT_GT(terminated, 5);
+  EXPECT_GT(cut, 5);
+}
+
+TEST(StepLoopTest, NextObservationIsTheFollowingObservation) {
+  const std::vector<Seen> seen = Walk({}, 2);
+  for (std::size_t i = 0; i + kEnvs < seen.size(); ++i) {
+    const Seen& now = seen[i];
+    const Seen& following = seen[i + kEnvs];
+    EXPECT_EQ(now.next_observation, (Floats{now.seed(), now.step() + 1}));
+    if (now.end.has_value()) {
+      EXPECT_EQ(following.step(), 0);
+    } else {
+      EXPECT_EQ(now.next_observation, following.observation);
+      EXPECT_EQ(now.next_mask, following.mask);
+    }
+  }
+}
+
+TEST(StepLoopTest, TellsHowEachEpisodeWent) {
+  const std::vector<Seen> seen = Walk({}, 3);
+  std::vector<double> returns(kEnvs, 0.0);
+  std::vector<int> lengths(kEnvs, 0);
+  int ends = 0;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    double& episode_return = returns[i % kEnvs];
+    int& length = lengths[i % kEnvs];
+    episode_return += seen[i].reward;
+    ++length;
+    if (!seen[i].end.has_value()) continue;
+    ++ends;
+    EXPECT_FLOAT_EQ(seen[i].end->episode_return, static_cast<float>(episode_return));
+    EXPECT_EQ(seen[i].end->length, length);
+    EXPECT_TRUE(std::isnan(seen[i].end->score));
+    episode_return = 0;
+    length = 0;
+  }
+  EXPECT_GT(ends, 10);
+}
+
+TEST(StepLoopTest, TellsTheScoreOfAGame) {
+  std::vector<Seen> seen;
+  auto games = VectorEnv::Create({.name = "connect4", .opponents = {"random"}}, 8).value();
+  StepLoop loop(std::move(games), {}, Rng(4), Into(&seen));
+  const auto policy = UntrainedPolicy(Connect4Spec(), 1);
+  for (int step = 0; step < 60; ++step) ASSERT_TRUE(loop.Step(*policy).ok());
+  int won = 0, lost = 0;
+  for (const Seen& t : seen) {
+    if (!t.end.has_value()) continue;
+    EXPECT_EQ(t.end->score, (t.reward + 1) / 2);
+    EXPECT_EQ(t.end->episode_return, t.reward);
+    won += t.end->score == 1;
+    lost += t.end->score == 0;
+  }
+  EXPECT_GT(won, 0);
+  EXPECT_GT(lost, 0);
+}
+
+TEST(StepLoopTest, JudgesTheActionThatWasTakenByThePushedCritics) {
+  const EnvSpec spec = LineEnv().spec();
+  for (const double epsilon : {0.0, 1.0}) {
+    std::vector<Seen> seen;
+    StepLoop loop(MakeLines(kEnvs), {.mode = MODE, .epsilon = epsilon}, Rng(5), Into(&seen));
+    PolicyRunner runner;
+    for (const std::uint64_t version : {7, 8, 9}) {
+      const auto policy = UntrainedPolicy(spec, version);
+      seen.clear();
+      ASSERT_TRUE(loop.Step(*policy).ok());
+      for (const Seen& t : seen) {
+        const PolicyView& view =
+            runner.View(*policy, Eigen::Map<const VectorX<float>>(t.observation.data(), 2),
+                        Eigen::Map<const VectorX<float>>(t.mask.data(), 3));
+        const auto action = static_cast<int>(t.action[0]);
+        EXPECT_GT(t.mask[action], 0);
+        EXPECT_NEAR(t.advantage, view.q(action, 0) - view.policy.col(0).dot(view.q.col(0)), 1e-5);
+        EXPECT_EQ(t.critic_version, version);
+      }
+    }
+    EXPECT_EQ(loop.counters().explored, epsilon > 0 ? 3 * kEnvs : 0);
+  }
+}
+
+TEST(StepLoopTest, WithoutCriticsTransitionsAreNotYetJudged) {
+  for (const Seen& t : Walk({}, 6, /*with_critics=*/false)) EXPECT_TRUE(std::isnan(t.advantage));
+}
+
+TEST(StepLoopTest, TheSameSeedGivesTheSameTransitions) {
+  const StepLoopOptions options = {.mode = SAMPLE, .epsilon = 0.3, .epsilon_ladder = 2};
+  const std::vector<Seen> a = Walk(options, 7), b = Walk(options, 7), other = Walk(options, 8);
+  int different = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].observation, b[i].observation);
+    EXPECT_EQ(a[i].action, b[i].action);
+    different += a[i].observation != other[i].observation;
+  }
+  EXPECT_GT(different, 0);
+}
+
+TEST(StepLoopTest, EndsWithTheErrorOfItsSink) {
+  int taken = 0;
+  StepLoop loop(MakeLines(kEnvs), {}, Rng(9), [&](const TransitionView&, float, std::uint64_t, const auto&) {
+    return ++taken < 3 ? absl::OkStatus() : absl::CancelledError("closed");
+  });
+  EXPECT_TRUE(absl::IsCancelled(loop.Step(*UntrainedPolicy(LineEnv().spec(), 1))));
+  EXPECT_EQ(loop.counters().transitions, 2);
+}
+
+TEST(StepLoopTest, RefusesAModeWhoseNetworksAreMissing) {
+  std::vector<Seen> seen;
+  StepLoop loop(MakeLines(kEnvs), {.mode = GREEDY_Q}, Rng(10), Into(&seen));
+  EXPECT_TRUE(
+      absl::IsInvalidArgument(loop.Step(*UntrainedPolicy(LineEnv().spec(), 1, /*with_critics=*/false))));
+  EXPECT_TRUE(seen.empty());
+}
+
+}  // namespace
+}  // namespace dbr

@@ -1,0 +1,211 @@
+// The replay: its buffer alone, and through gRPC on a unix socket. Rows have the shape of Connect-4's.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "core/check.h"
+#include "core/rng.h"
+#include "replay/client.h"
+#include "replay/partitioned_buffer.h"
+#include "replay/replay_server.h"
+#include "replay/writer.h"
+
+namespace dbr {
+namespace {
+
+constexpr TransitionLayout kLayout{.observation_width = 84, .action_width = 1, .mask_width = 7};
+constexpr std::uint64_t kCapacity = 200000;
+constexpr int kRowsInMessage = 44;  // 32 KiB
+constexpr int kBatch = 256;
+constexpr absl::Duration kTimeout = absl::Seconds(60);
+
+// `count` rows of zeros, ones and advantages of either sign.
+struct Columns {
+  explicit Columns(int count)
+      : observations(static_cast<std::size_t>(count) * kLayout.observation_width),
+        actions(count),
+        masks(static_cast<std::size_t>(count) * kLayout.mask_width, 1.0f),
+        rewards(count),
+        discounts(count, 0.99f),
+        advantages(count),
+        versions(count, 1),
+        keys(count) {
+    Rng rng(1);
+    for (float& value : observations) value = static_cast<float>(rng.Below(2));
+    for (float& value : advantages) value = static_cast<float>(rng.Normal());
+  }
+  InsertColumns insert() const {
+    return {.count = static_cast<int>(rewards.size()),
+            .observations = observations.data(),
+            .actions = actions.data(),
+            .masks = masks.data(),
+            .rewards = rewards.data(),
+            .discounts = discounts.data(),
+            .next_observations = observations.data(),
+            .next_masks = masks.data(),
+            .advantages = advantages.data(),
+            .critic_versions = versions.data()};
+  }
+  DrawColumns draw() {
+    return {.keys = keys.data(),
+            .observations = observations.data(),
+            .actions = actions.data(),
+            .masks = masks.data(),
+            .rewards = rewards.data(),
+            .discounts = discounts.data(),
+            .next_observations = next_observations.data(),
+            .next_masks = next_masks.data()};
+  }
+  std::vector<float> observations, actions, masks, rewards, discounts, advantages;
+  std::vector<std::uint64_t> versions, keys;
+  std::vector<float> next_observations = observations, next_masks = masks;
+};
+
+// A full buffer in memory.
+class FullBuffer {
+ public:
+  FullBuffer() {
+    auto store = TransitionStore::Open({.env = "connect4", .layout = kLayout, .capacity = kCapacity});
+    DBR_CHECK(store.ok());
+    auto made = PartitionedBuffer::Make(std::move(*store), {});
+    DBR_CHECK(made.ok());
+    buffer = std::move(*made);
+    auto opened = buffer->OpenWriter({.id = 1, .name = "bench"});
+    DBR_CHECK(opened.ok());
+    place = *opened;
+    for (std::uint64_t i = 0; i < kCapacity; i += kRowsInMessage) Insert();
+  }
+  void Insert() {
+    InsertBatch batch{.first_sequence = next_sequence, .columns = message.insert()};
+    DBR_CHECK(buffer->Insert(place, &batch, absl::InfiniteFuture()).ok());
+    next_sequence += kRowsInMessage;
+  }
+  std::unique_ptr<PartitionedBuffer> buffer;
+  std::uint32_t place = 0;
+  std::uint64_t next_sequence = 1;
+  Columns message{kRowsInMessage};
+};
+
+void BufferInsert(benchmark::State& state) {
+  FullBuffer full;
+  for (auto _ : state) full.Insert();
+  state.SetItemsProcessed(state.iterations() * kRowsInMessage);
+}
+BENCHMARK(BufferInsert);
+
+void BufferSample(benchmark::State& state) {
+  FullBuffer full;
+  Columns columns(kBatch);
+  columns.next_observations = columns.observations;
+  columns.next_masks = columns.masks;
+  const DrawBuffers out = {columns.draw(), {}, {}};
+  DrawResult result;
+  for (auto _ : state) {
+    DBR_CHECK(full.buffer->Draw({.counts = {kBatch, 0, 0}}, out, absl::InfiniteFuture(), &result).ok());
+  }
+  state.SetItemsProcessed(state.iterations());  // batches
+}
+BENCHMARK(BufferSample);
+
+void BufferRelabel(benchmark::State& state) {
+  FullBuffer full;
+  Rng rng(2);
+  std::vector<std::uint64_t> keys(kBatch);
+  std::vector<float> advantages(kBatch);
+  std::uint64_t version = 1;
+  for (auto _ : state) {
+    for (auto& key : keys) key = full.next_sequence - 1 - rng.Below(kCapacity);
+    for (auto& advantage : advantages) advantage = static_cast<float>(rng.Uniform()) - 0.5f;
+    DBR_CHECK(full.buffer->Relabel(++version, keys, advantages)->relabelled == kBatch);
+  }
+  state.SetItemsProcessed(state.iterations() * kBatch);
+}
+BENCHMARK(BufferRelabel);
+
+// A server on a unix socket whose store lies in a file, with a client's side in this process.
+class Served {
+ public:
+  Served() {
+    DBR_CHECK(mkdtemp(folder_.data()) != nullptr);
+    ReplayServerOptions options;
+    options.store = {
+        .path = absl::StrCat(folder_, "/store"), .env = "connect4", .layout = kLayout, .capacity = kCapacity};
+    options.server.address = absl::StrCat("unix:", folder_, "/replay.sock");
+    auto started = ReplayServer::Start(options);
+    DBR_CHECK(started.ok());
+    server = std::move(*started);
+    writer = std::make_unique<TransitionWriter>(
+        WriterOptions{.address = server->address(), .name = "bench", .layout = kLayout});
+  }
+  ~Served() {
+    writer.reset();
+    server.reset();
+    std::filesystem::remove_all(folder_);
+  }
+  // Blocks until all are acknowledged.
+  void Write(int count) {
+    for (int i = 0; i < count; ++i) {
+      const int row = i % kRowsInMessage;
+      DBR_CHECK(
+          writer
+              ->Append(message.insert().Row(kLayout, row), message.advantages[row], 1, std::nullopt, kTimeout)
+              .ok());
+    }
+    DBR_CHECK(writer->Flush(kTimeout).ok());
+  }
+
+ private:
+  std::string folder_ = (std::filesystem::temp_directory_path() / "dbr-XXXXXX").string();
+
+ public:
+  std::unique_ptr<ReplayServer> server;
+  std::unique_ptr<TransitionWriter> writer;
+  Columns message{kRowsInMessage};
+};
+
+// Transitions appended by one thread until they are acknowledged; the latency is the server's, of one
+// message.
+void ReplayInsert(benchmark::State& state) {
+  constexpr int kWrites = 30000;
+  Served served;
+  served.Write(kCapacity);
+  for (auto _ : state) served.Write(kWrites);
+  state.SetItemsProcessed(state.iterations() * kWrites);
+  const auto stats = ReplayClient(served.server->address()).Stats(kTimeout);
+  DBR_CHECK(stats.ok());
+  for (const LatencyStats& latency : stats->latencies()) {
+    if (latency.call() != "insert") continue;
+    state.counters["p50_us"] = latency.p50_us();
+    state.counters["p99_us"] = latency.p99_us();
+  }
+}
+BENCHMARK(ReplayInsert)->UseRealTime()->Unit(benchmark::kMillisecond);
+
+// Batches of 256 drawn from D by one caller and decoded; the latency is the caller's.
+void ReplaySample(benchmark::State& state) {
+  Served served;
+  served.Write(kCapacity);
+  ReplayClient client(served.server->address());
+  DrawnBatches drawn;
+  std::vector<double> latencies_us;
+  for (auto _ : state) {
+    const absl::Time start = absl::Now();
+    DBR_CHECK(client.Sample({.uniform = kBatch}, kLayout, kTimeout, &drawn).ok());
+    latencies_us.push_back(absl::ToDoubleMicroseconds(absl::Now() - start));
+  }
+  state.SetItemsProcessed(state.iterations());  // batches
+  std::sort(latencies_us.begin(), latencies_us.end());
+  state.counters["p50_us"] = latencies_us[latencies_us.size() / 2];
+  state.counters["p99_us"] = latencies_us[latencies_us.size() * 99 / 100];
+}
+BENCHMARK(ReplaySample)->UseRealTime()->Unit(benchmark::kMicrosecond);
+
+}  // namespace
+}  // namespace dbr
