@@ -1,6 +1,5 @@
 // The selectors by name: a new one is a file beside this one and a line here.
 #include <array>
-#include <string>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -22,14 +21,18 @@ constexpr std::array kSelectors = {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Selector>> MakeSelector(absl::string_view name, std::uint32_t capacity) {
+std::vector<absl::string_view> SelectorNames() {
   std::vector<absl::string_view> names;
+  for (const Entry& entry : kSelectors) names.push_back(entry.name);
+  return names;
+}
+
+absl::StatusOr<std::unique_ptr<Selector>> MakeSelector(absl::string_view name, std::uint32_t capacity) {
   for (const Entry& entry : kSelectors) {
     if (entry.name == name) return entry.make(capacity);
-    names.push_back(entry.name);
   }
   return absl::InvalidArgumentError(
-      absl::StrCat("selector: expected one of ", absl::StrJoin(names, ", "), ", found '", name, "'"));
+      absl::StrCat("selector: expected one of ", absl::StrJoin(SelectorNames(), ", "), ", found '", name, "'"));
 }
 
 }  // namespace dbr

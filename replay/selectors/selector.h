@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
@@ -29,5 +30,8 @@ class Selector {
 // Makes an empty selector for slots below `capacity`. InvalidArgument, naming those that there are, for
 // another name.
 absl::StatusOr<std::unique_ptr<Selector>> MakeSelector(absl::string_view name, std::uint32_t capacity);
+
+// All names; the conformance suite walks them.
+std::vector<absl::string_view> SelectorNames();
 
 }  // namespace dbr

@@ -72,7 +72,11 @@ struct Columns {
 class FullBuffer {
  public:
   FullBuffer() {
-    auto store = TransitionStore::Open({.env = "connect4", .layout = kLayout, .capacity = kCapacity});
+    StoreOptions options;
+    options.env = "connect4";
+    options.layout = kLayout;
+    options.capacity = kCapacity;
+    auto store = TransitionStore::Open(options);
     DBR_CHECK(store.ok());
     auto made = PartitionedBuffer::Make(std::move(*store), {});
     DBR_CHECK(made.ok());
@@ -83,7 +87,9 @@ class FullBuffer {
     for (std::uint64_t i = 0; i < kCapacity; i += kRowsInMessage) Insert();
   }
   void Insert() {
-    InsertBatch batch{.first_sequence = next_sequence, .columns = message.insert()};
+    InsertBatch batch;
+    batch.first_sequence = next_sequence;
+    batch.columns = message.insert();
     DBR_CHECK(buffer->Insert(place, &batch, absl::InfiniteFuture()).ok());
     next_sequence += kRowsInMessage;
   }
@@ -141,8 +147,11 @@ class Served {
     auto started = ReplayServer::Start(options);
     DBR_CHECK(started.ok());
     server = std::move(*started);
-    writer = std::make_unique<TransitionWriter>(
-        WriterOptions{.address = server->address(), .name = "bench", .layout = kLayout});
+    WriterOptions writer_options;
+    writer_options.address = server->address();
+    writer_options.name = "bench";
+    writer_options.layout = kLayout;
+    writer = std::make_unique<TransitionWriter>(writer_options);
   }
   ~Served() {
     writer.reset();
