@@ -1,5 +1,6 @@
 #include "proto/server.h"
 
+#include <arpa/inet.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -19,9 +20,13 @@ namespace {
 
 constexpr int kMaxMessageBytes = 256 << 20;
 
+// "127.x.y.z:PORT", "[::1]:PORT" or "localhost:PORT"; a name that only begins like one of these may be
+// anybody's.
 bool IsLoopback(absl::string_view address) {
-  return absl::StartsWith(address, "127.") || absl::StartsWith(address, "localhost:") ||
-         absl::StartsWith(address, "[::1]:");
+  const std::string host(address.substr(0, address.rfind(':')));
+  in_addr parsed;
+  if (inet_pton(AF_INET, host.c_str(), &parsed) == 1) return ntohl(parsed.s_addr) >> 24 == 127;
+  return host == "localhost" || host == "[::1]";
 }
 
 // Tries to connect: true where somebody answers at the socket.
@@ -55,8 +60,8 @@ absl::Status CheckAddress(const ServerOptions& options) {
     struct stat found;
     if (lstat(path.c_str(), &found) != 0) return absl::OkStatus();
     if (!S_ISSOCK(found.st_mode)) {
-      return absl::InvalidArgumentError(absl::StrCat("cannot listen on ", address,
-                                                     ": expected a socket or nothing at that path, found another file"));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "cannot listen on ", address, ": expected a socket or nothing at that path, found another file"));
     }
     if (SocketIsServed(path)) return AddressInUse(address);
     unlink(path.c_str());
