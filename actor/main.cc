@@ -85,7 +85,7 @@ int Main(int argc, char** argv) {
 }  // namespace dbr
 
 int main(int argc, char** argv) {
+  dbr::RestartWithOneBlasThread(argv);
   dbr::BlockShutdownSignals();
-  dbr::UseOneBlasThread();
   return dbr::Main(argc, argv);
 }

@@ -120,7 +120,6 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
 }
 
 int Main(int argc, char** argv) {
-  UseOneBlasThread();
   spdlog::set_default_logger(spdlog::stderr_color_mt("learner"));
   CLI::App app("Trains an algorithm from a replay server and serves its policy.", "dbr-learner");
   Arguments arguments;
@@ -163,6 +162,7 @@ int Main(int argc, char** argv) {
 }  // namespace dbr
 
 int main(int argc, char** argv) {
+  dbr::RestartWithOneBlasThread(argv);
   dbr::BlockShutdownSignals();
   return dbr::Main(argc, argv);
 }
