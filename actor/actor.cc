@@ -83,9 +83,8 @@ void Actor::Stop() {
 
 absl::Status Actor::Run() {
   const absl::Status status = Act();
-  if (!stopping_) return status;
   Drain();
-  return absl::OkStatus();
+  return stopping_ ? absl::OkStatus() : status;
 }
 
 absl::Status Actor::Act() {

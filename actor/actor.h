@@ -33,9 +33,9 @@ class Actor {
   // Errors as MakeEnv's. Connects in the background: the servers need not be there yet.
   static absl::StatusOr<std::unique_ptr<Actor>> Create(const ActorOptions& options);
 
-  // Blocks until Stop(), then until everything written is acknowledged or drain_timeout has passed (which is
-  // said, with how many transitions were lost), and gives OK; or until a final error of the policy, the
-  // environments or the writer.
+  // Blocks until Stop(), which gives OK, or until a final error of the policy, the environments or the
+  // writer; then, in either case, until all that was written is acknowledged or drain_timeout has passed
+  // (which is said, with the counts).
   absl::Status Run();
 
   void Stop();  // from any thread
