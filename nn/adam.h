@@ -38,6 +38,7 @@ class Adam {
     }
   }
 
+  void set_learning_rate(double learning_rate) { learning_rate_ = learning_rate; }
   std::uint64_t steps() const { return steps_; }
   void set_steps(std::uint64_t steps) { steps_ = steps; }
   VectorX<Scalar>& first_moment() { return first_; }

@@ -11,7 +11,8 @@
 
 namespace dbr {
 
-// Nested lists [n][dimensions] as [dimensions x n], or [n][samples][dimensions] as [dimensions x n * samples].
+// Nested lists [n][dimensions] as [dimensions x n], or [n][samples][dimensions] as [dimensions x n *
+// samples].
 inline MatrixX<double> ToMatrix(const nlohmann::json& rows) {
   if (rows[0][0].is_array()) {
     nlohmann::json flat = nlohmann::json::array();
@@ -37,11 +38,14 @@ inline void ExpectNear(const MatrixX<double>& found, const MatrixX<double>& expe
   ASSERT_EQ(found.cols(), expected.cols());
   EXPECT_TRUE(found.allFinite());
   const double tolerance = scale * (1 + expected.cwiseAbs().maxCoeff());
-  EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), tolerance) << "found\n" << found << "\nexpected\n" << expected;
+  EXPECT_LT((found - expected).cwiseAbs().maxCoeff(), tolerance) << "found\n"
+                                                                 << found << "\nexpected\n"
+                                                                 << expected;
 }
 
 // Compares `gradient` with the central differences of `f` at `at`.
-inline void ExpectIsGradient(const MatrixX<double>& gradient, const std::function<double(const MatrixX<double>&)>& f,
+inline void ExpectIsGradient(const MatrixX<double>& gradient,
+                             const std::function<double(const MatrixX<double>&)>& f,
                              const MatrixX<double>& at) {
   constexpr double kStep = 1e-6;
   MatrixX<double> differences(at.rows(), at.cols());

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
+#include "learner/parts/learning_rate.h"
 
 namespace dbr {
 namespace {
@@ -55,6 +56,7 @@ DiscreteDbr<Scalar>::DiscreteDbr(const AlgorithmSpec& spec)
 template <class Scalar>
 absl::Status DiscreteDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                                          const BasicBatch<Scalar>& minus) {
+  SetLearningRate(LearningRate(spec_.config, updates_));
   runner_.Run([&] { FitBehavior(plus, &beta_plus_); }, [&] { FitBehavior(minus, &beta_minus_); });
   ComputeTargets(uniform);
   const Scalar critic_loss = critics_.Fit(uniform.observations, uniform.actions, target_);
@@ -65,6 +67,14 @@ absl::Status DiscreteDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, cons
   policy_.UpdateTarget(spec_.config.target_tau());
   ++updates_;
   return Report(critic_loss, policy_loss, uniform);
+}
+
+template <class Scalar>
+void DiscreteDbr<Scalar>::SetLearningRate(double learning_rate) {
+  policy_.set_learning_rate(learning_rate);
+  critics_.set_learning_rate(learning_rate);
+  beta_plus_.network.set_learning_rate(learning_rate);
+  beta_minus_.network.set_learning_rate(learning_rate);
 }
 
 template <class Scalar>

@@ -56,6 +56,7 @@ class DiscreteDbr {
     Scalar loss = 0;                   // mean of -log beta(a|s) in the newest fit
   };
 
+  void SetLearningRate(double learning_rate);
   static void FitBehavior(const BasicBatch<Scalar>& batch, Behavior* behavior);
   static void EvaluateBehavior(const MatrixX<Scalar>& observations, const MatrixX<Scalar>& masks,
                                Behavior* behavior);

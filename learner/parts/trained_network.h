@@ -47,6 +47,7 @@ class TrainedNetwork {
     ComputeGradient(x, d_output);
     adam_.Step(gradient_, &parameters_);
   }
+  void set_learning_rate(double learning_rate) { adam_.set_learning_rate(learning_rate); }
   void UpdateTarget(double tau) { PolyakUpdate(parameters_, static_cast<Scalar>(tau), &target_); }
 
   void Save(const std::string& name, TensorFile* file) const {

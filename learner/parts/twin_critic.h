@@ -41,6 +41,10 @@ class TwinCritic {
   const MatrixX<Scalar>& q1() const { return first_.q; }
   const MatrixX<Scalar>& q2() const { return second_.q; }
 
+  void set_learning_rate(double learning_rate) {
+    first_.network.set_learning_rate(learning_rate);
+    second_.network.set_learning_rate(learning_rate);
+  }
   void UpdateTargets(double tau) {
     first_.network.UpdateTarget(tau);
     second_.network.UpdateTarget(tau);

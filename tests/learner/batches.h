@@ -1,0 +1,44 @@
+// Batches and specs for the tests of algorithms.
+#pragma once
+
+#include "core/rng.h"
+#include "learner/algorithm.h"
+
+namespace dbr {
+
+// A small discrete problem: 5 inputs, 3 actions, two hidden layers of 8.
+inline AlgorithmSpec SmallSpec(std::uint64_t seed = 1) {
+  AlgorithmSpec spec;
+  spec.env = "test";
+  spec.observation_size = 5;
+  spec.actions = {ActionKind::kDiscrete, 3};
+  spec.hidden_sizes = {8, 8};
+  spec.config.set_batch_size(16);
+  spec.config.mutable_dbr();
+  spec.seed = seed;
+  return spec;
+}
+
+// Random transitions; action 2 is illegal in every third state.
+template <class Scalar>
+BasicBatch<Scalar> RandomBatch(const AlgorithmSpec& spec, int n, Rng& rng) {
+  BasicBatch<Scalar> batch;
+  batch.Resize({spec.observation_size, spec.actions.width(), spec.actions.mask_width()}, n,
+               /*with_keys=*/true);
+  const auto draw = [&](Scalar) { return static_cast<Scalar>(2 * rng.Uniform() - 1); };
+  batch.observations = batch.observations.unaryExpr(draw).eval();
+  batch.next_observations = batch.next_observations.unaryExpr(draw).eval();
+  batch.masks.setOnes();
+  batch.next_masks.setOnes();
+  for (int j = 0; j < n; ++j) {
+    const bool restricted = j % 3 == 0;
+    if (restricted) batch.masks(2, j) = batch.next_masks(2, j) = 0;
+    batch.actions(0, j) = static_cast<Scalar>(rng.Below(restricted ? 2 : 3));
+    batch.rewards[j] = static_cast<Scalar>(rng.Uniform());
+    batch.discounts[j] = j % 5 == 0 ? Scalar{0} : Scalar{0.99};
+    batch.keys[static_cast<std::size_t>(j)] = static_cast<std::uint64_t>(j);
+  }
+  return batch;
+}
+
+}  // namespace dbr

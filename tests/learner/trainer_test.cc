@@ -1,0 +1,153 @@
+// The learner against a real replay server: updates, advantages written back, checkpoints, continuation.
+#include "learner/trainer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "absl/time/clock.h"
+#include "replay/replay_server.h"
+#include "replay/writer.h"
+#include "tests/learner/batches.h"
+#include "tests/temp_dir.h"
+
+namespace dbr {
+namespace {
+
+constexpr std::uint64_t kUpdates = 30;
+
+class TrainerTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    Config config;
+    config.mutable_replay()->set_capacity(1000);
+    config.mutable_replay()->set_min_size(64);
+    ReplayServerOptions options = OptionsFrom(config, Layout());
+    options.server.address = "unix:" + folder_.path() + "/replay.sock";
+    auto replay = ReplayServer::Start(options);
+    ASSERT_TRUE(replay.ok()) << replay.status();
+    replay_ = std::move(replay).value();
+    auto metrics = MetricsSink::Open(RunFolder{folder_.path()}, absl::Seconds(1), absl::Now());
+    ASSERT_TRUE(metrics.ok()) << metrics.status();
+    metrics_ = std::move(metrics).value();
+  }
+
+  static TransitionLayout Layout() { return {5, 1, 3}; }
+
+  // Unjudged transitions.
+  void Insert(int count) {
+    TransitionWriter writer({.address = replay_->address(), .name = "test", .layout = Layout()});
+    const Batch batch = RandomBatch<float>(SmallSpec(), count, rng_);
+    const auto column = [](const MatrixX<float>& m, int j) {
+      return absl::Span<const float>(m.data() + m.rows() * j, static_cast<std::size_t>(m.rows()));
+    };
+    for (int j = 0; j < count; ++j) {
+      const TransitionView view{column(batch.observations, j),
+                                column(batch.actions, j),
+                                column(batch.masks, j),
+                                batch.rewards[j],
+                                batch.discounts[j],
+                                column(batch.next_observations, j),
+                                column(batch.next_masks, j)};
+      ASSERT_TRUE(writer.Append(view, kUnjudged, 0, std::nullopt, absl::Seconds(10)).ok());
+    }
+    ASSERT_TRUE(writer.Flush(absl::Seconds(10)).ok());
+  }
+
+  std::unique_ptr<Trainer> MakeTrainer(std::uint64_t max_updates) {
+    LearnerConfig config;
+    config.set_max_updates(max_updates);
+    config.set_push_every(10);
+    config.set_metrics_every(10);
+    AlgorithmSpec spec = SmallSpec();
+    TrainerParts parts{.algorithm = MakeAlgorithm(spec).value(),
+                       .policy_service = &service_,
+                       .metrics = metrics_.get(),
+                       .saver = &saver_,
+                       .prefetcher = nullptr,
+                       .relabeller = nullptr};
+    const BatchNeeds needs = parts.algorithm->needs();
+    draws_ = std::make_unique<ReplayClient>(replay_->address());
+    labels_ = std::make_unique<ReplayClient>(replay_->address());
+    parts.relabeller = std::make_unique<Relabeller>(labels_.get());
+    parts.prefetcher = std::make_unique<Prefetcher>(
+        draws_.get(),
+        PrefetcherOptions{.counts = {needs.uniform, needs.plus, needs.minus}, .layout = Layout()});
+    return std::make_unique<Trainer>(config, std::move(parts));
+  }
+
+  // Runs until the service says that training has finished, then stops.
+  void RunToTheEnd(Trainer* trainer) {
+    std::thread thread([&] { EXPECT_TRUE(trainer->Run().ok()); });
+    const absl::Time deadline = absl::Now() + absl::Seconds(60);
+    LearnerStatus status;
+    while (!status.finished() && absl::Now() < deadline) {
+      service_.Status(nullptr, nullptr, &status);
+      std::this_thread::yield();
+    }
+    EXPECT_TRUE(status.finished());
+    trainer->Stop();
+    thread.join();
+  }
+
+  Rng rng_{4};
+  TempDir folder_;
+  std::unique_ptr<ReplayServer> replay_;
+  std::unique_ptr<MetricsSink> metrics_;
+  PolicyService service_{[](const EvaluationReport&) {}};
+  Saver saver_{RunFolder{folder_.path()}, 3};
+  std::unique_ptr<ReplayClient> draws_, labels_;
+};
+
+TEST_F(TrainerTest, TrainsWritesAdvantagesBackAndSaves) {
+  Insert(100);
+  const auto trainer = MakeTrainer(kUpdates);
+  RunToTheEnd(trainer.get());
+  EXPECT_EQ(trainer->updates(), kUpdates);
+  ReplayClient client(replay_->address());
+  const auto stats = client.Stats(absl::Seconds(10));
+  ASSERT_TRUE(stats.ok()) << stats.status();
+  EXPECT_GT(stats->relabelled(), 0u);
+  EXPECT_GT(stats->plus() + stats->minus(), 0u);
+  const auto policy = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
+  ASSERT_TRUE(policy.ok()) << policy.status();
+  EXPECT_EQ(policy->updates, kUpdates);
+}
+
+TEST_F(TrainerTest, ContinuesFromItsCheckpoint) {
+  Insert(100);
+  RunToTheEnd(MakeTrainer(kUpdates).get());
+  const auto saved = Checkpoints(RunFolder{folder_.path()}.checkpoints(), 3).LoadNewest();
+  ASSERT_TRUE(saved.ok()) << saved.status();
+  const auto policy_before = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
+  const auto again = MakeTrainer(2 * kUpdates);
+  ASSERT_TRUE(again->Load(saved->file).ok());
+  EXPECT_EQ(again->updates(), kUpdates);
+  RunToTheEnd(again.get());
+  EXPECT_EQ(again->updates(), 2 * kUpdates);
+  const auto policy_after = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
+  ASSERT_TRUE(policy_before.ok() && policy_after.ok());
+  EXPECT_GT(policy_after->version, policy_before->version);
+}
+
+TEST_F(TrainerTest, StopsWhileTheRateLimiterHoldsTheFirstDraw) {
+  Insert(10);  // below min_size
+  const auto trainer = MakeTrainer(kUpdates);
+  std::thread thread([&] { EXPECT_TRUE(trainer->Run().ok()); });
+  trainer->Stop();
+  thread.join();
+  EXPECT_EQ(trainer->updates(), 0u);
+}
+
+TEST_F(TrainerTest, ABatchOfOtherWidthsIsAFinalError) {
+  Insert(100);
+  ReplayClient client(replay_->address());
+  Prefetcher prefetcher(&client, {.counts = {4, 0, 0}, .layout = {6, 1, 3}});
+  const auto batches = prefetcher.Next();
+  EXPECT_TRUE(absl::IsInvalidArgument(batches.status())) << batches.status();
+  EXPECT_THAT(std::string(batches.status().message()), testing::HasSubstr("observation_width"));
+}
+
+}  // namespace
+}  // namespace dbr
