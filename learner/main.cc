@@ -24,6 +24,7 @@ namespace dbr {
 namespace {
 
 constexpr absl::Duration kMetricsFlush = absl::Seconds(2);
+constexpr absl::Duration kFirstStatsTimeout = absl::Seconds(5);
 constexpr absl::Duration kRolloutPeriod = absl::Seconds(5);
 
 struct Arguments {

@@ -1,6 +1,7 @@
 // The learner's main loop: draw, update, write advantages back, push the policy, save.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 
@@ -35,6 +36,10 @@ class Trainer {
 
   // Continues from a checkpoint that Save() made.
   absl::Status Load(const TensorFile& file);
+
+  // Versions will be greater than `version`: labels of a learner that went on after its last checkpoint, and was then
+  // killed, carry versions that this one would use again, and the replay refuses what is older than a label it has.
+  void StartVersionsAfter(std::uint64_t version) { snapshot_.version = std::max(snapshot_.version, version); }
 
   // Publishes the first policy, then updates until stopped, an error, or max_updates; saves at the end. After
   // max_updates it goes on serving until Stop. OK after Stop.

@@ -167,6 +167,7 @@ void Encode(const BufferStats& stats, StatsReply* reply) {
   reply->set_samples_per_insert(stats.inserted == 0 ? 0
                                                     : static_cast<double>(stats.counters.sampled) /
                                                           static_cast<double>(stats.inserted));
+  reply->set_newest_critic_version(stats.counters.newest_label);
   reply->set_label_age_mean(stats.labels.age_mean);
   reply->set_label_age_p95(stats.labels.age_p95);
   reply->mutable_advantage_edges()->Assign(stats.labels.edges.begin(), stats.labels.edges.end());
