@@ -2,6 +2,7 @@
 #include "actor/actor.h"
 
 #include <cmath>
+#include <functional>
 #include <thread>
 
 #include "gmock/gmock.h"
@@ -22,6 +23,28 @@ constexpr absl::Duration kLong = absl::Seconds(30);  // reached only where somet
 
 // As many transitions are drawn as are inserted, so that a draw is a way to wait for inserts.
 constexpr int kDrawn = 1000;
+
+// Runs an actor in a thread of its own, to be stopped and joined however the test ends.
+class RunningActor {
+ public:
+  explicit RunningActor(Actor* actor) : actor_(actor), thread_([this] { status_ = actor_->Run(); }) {}
+  ~RunningActor() {
+    if (thread_.joinable()) Stop().IgnoreError();
+  }
+
+  // Stops it while `meanwhile` runs; gives what Run gave.
+  absl::Status Stop(const std::function<void()>& meanwhile = [] {}) {
+    actor_->Stop();
+    meanwhile();
+    thread_.join();
+    return status_;
+  }
+
+ private:
+  Actor* const actor_;
+  absl::Status status_;
+  std::thread thread_;
+};
 
 class ActorTest : public ::testing::Test {
  protected:
@@ -69,15 +92,13 @@ class ActorTest : public ::testing::Test {
     return true;
   }
 
-  // Stops the actor and lets what it still holds through the limiter: one draw makes room for more than it
-  // may buffer, and where the draw is refused there is room already.
-  void StopAndDrain(Actor* actor, std::thread* running) {
-    actor->Stop();
+  // Lets what an actor still holds through the limiter: one draw makes room for more than it may buffer, and
+  // where the draw has to wait there is room already.
+  void MakeRoom() {
     DrawnBatches drawn;
     const absl::Status status =
         client_->Sample({.uniform = kDrawn}, TransitionLayout::Of(Connect4Spec()), absl::Seconds(1), &drawn);
     EXPECT_TRUE(status.ok() || absl::IsDeadlineExceeded(status)) << status;
-    running->join();
   }
 
   // What the server holds of one writer that has written `written`: each once.
@@ -144,10 +165,9 @@ TEST_F(ActorTest, WritesUntilItIsStoppedAndLeavesNothingBehind) {
   LearnerDouble learner(learner_address_);
   learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
   const auto actor = MakeActor();
-  absl::Status status = absl::UnknownError("not run");
-  std::thread running([&] { status = actor->Run(); });
-  EXPECT_TRUE(AwaitInserted(3000));
-  StopAndDrain(actor.get(), &running);
+  RunningActor running(actor.get());
+  ASSERT_TRUE(AwaitInserted(3000));
+  const absl::Status status = running.Stop([this] { MakeRoom(); });
   EXPECT_TRUE(status.ok()) << status;
   EXPECT_EQ(actor->counters().acknowledged, actor->counters().appended);
   const BufferStats stats = server->buffer().Stats();
@@ -162,24 +182,23 @@ TEST_F(ActorTest, GoesOnWhenTheLearnerAndTheReplayServerGoAwayAndComeBack) {
   auto learner = std::make_unique<LearnerDouble>(learner_address_);
   learner->Offer(Encode(UntrainedSnapshot(Connect4Spec(), 5)));
   const auto actor = MakeActor();
-  absl::Status status = absl::UnknownError("not run");
-  std::thread running([&] { status = actor->Run(); });
-  EXPECT_TRUE(AwaitInserted(2000));
+  RunningActor running(actor.get());
+  ASSERT_TRUE(AwaitInserted(2000));
 
   learner.reset();
-  EXPECT_TRUE(AwaitInserted(4000));
+  ASSERT_TRUE(AwaitInserted(4000));
 
   ASSERT_TRUE(server->Stop().ok());
   server.reset();
   server = StartReplay(Connect4Spec(), /*resume=*/true);
   client_ = std::make_unique<ReplayClient>(replay_address_);
-  EXPECT_TRUE(AwaitInserted(8000));
+  ASSERT_TRUE(AwaitInserted(8000));
 
   learner = std::make_unique<LearnerDouble>(learner_address_);
   learner->Offer(Encode(UntrainedSnapshot(Connect4Spec(), 6)));
   while (server->buffer().Stats().counters.newest_label < 6) ASSERT_TRUE(AwaitInserted(0));
 
-  StopAndDrain(actor.get(), &running);
+  const absl::Status status = running.Stop([this] { MakeRoom(); });
   EXPECT_TRUE(status.ok()) << status;
   EXPECT_EQ(actor->counters().reconnects, 1);
   EXPECT_EQ(actor->counters().acknowledged, actor->counters().appended);
@@ -190,12 +209,10 @@ TEST_F(ActorTest, StopsWithinItsDeadlineWhileTheReplayServerIsAway) {
   LearnerDouble learner(learner_address_);
   learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
   const auto actor = MakeActor(/*drain_timeout=*/absl::Milliseconds(10));
-  absl::Status status = absl::UnknownError("not run");
-  std::thread running([&] { status = actor->Run(); });
+  RunningActor running(actor.get());
   const absl::Time deadline = absl::Now() + kLong;
   while (actor->counters().appended < 500 && absl::Now() < deadline) std::this_thread::yield();
-  actor->Stop();
-  running.join();
+  const absl::Status status = running.Stop();
   EXPECT_TRUE(status.ok()) << status;
   EXPECT_EQ(actor->counters().appended, 500) << "as many as it may buffer";
   EXPECT_EQ(actor->counters().acknowledged, 0);
