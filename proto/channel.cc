@@ -1,10 +1,12 @@
 #include "proto/channel.h"
 
 #include "absl/time/clock.h"
+#include "proto/grpc_library.h"
 
 namespace dbr {
 
 std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address) {
+  KeepGrpcInitialized();
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(-1);
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);

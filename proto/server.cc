@@ -14,6 +14,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include "core/status_macros.h"
+#include "proto/grpc_library.h"
 
 namespace dbr {
 namespace {
@@ -85,6 +86,7 @@ absl::Status CheckAddress(const ServerOptions& options) {
 absl::StatusOr<RunningServer> StartServer(const ServerOptions& options,
                                           const std::vector<grpc::Service*>& services) {
   RETURN_IF_ERROR(CheckAddress(options));
+  KeepGrpcInitialized();
   static std::once_flag plugins;
   std::call_once(plugins, [] {
     grpc::EnableDefaultHealthCheckService(true);
