@@ -1,10 +1,12 @@
 #include "replay/client.h"
 
+#include <algorithm>
 #include <set>
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
 #include "core/status_macros.h"
 #include "proto/channel.h"
 #include "proto/codec.h"
@@ -13,8 +15,12 @@
 namespace dbr {
 namespace {
 
-// How much later than the server's the client's own deadline is, so that the server's message arrives.
-constexpr absl::Duration kAnswerTime = absl::Seconds(1);
+// How much later the client's own deadline is than the server's, so that the server's message arrives.
+constexpr absl::Duration kAnswerTime = absl::Seconds(5);
+
+// How long a call waits for a connection that is not there. Without somebody waiting a channel sees only
+// every five seconds what became of its tries to connect.
+constexpr absl::Duration kConnectTime = absl::Milliseconds(200);
 
 absl::Status DecodePart(const SampledPart& part, const TransitionLayout& layout, Batch* out) {
   RETURN_IF_ERROR(Decode(part.transitions(), layout, out));
@@ -28,7 +34,8 @@ absl::Status DecodePart(const SampledPart& part, const TransitionLayout& layout,
 
 class ReplayClient::Impl {
  public:
-  explicit Impl(const std::string& address) : stub_(Replay::NewStub(MakeChannel(address))) {}
+  explicit Impl(const std::string& address)
+      : channel_(MakeChannel(address)), stub_(Replay::NewStub(channel_)) {}
 
   // Runs `call(context)` with a deadline, unless and until closed.
   template <class Call>
@@ -40,6 +47,7 @@ class ReplayClient::Impl {
       if (closed_) return absl::CancelledError("the replay client is closed");
       contexts_.insert(&context);
     }
+    channel_->WaitForConnected(absl::ToChronoTime(absl::Now() + std::min(timeout, kConnectTime)));
     const grpc::Status status = call(&context);
     absl::MutexLock lock(&mutex_);
     contexts_.erase(&context);
@@ -68,6 +76,7 @@ class ReplayClient::Impl {
   Replay::Stub& stub() { return *stub_; }
 
  private:
+  const std::shared_ptr<grpc::Channel> channel_;
   const std::unique_ptr<Replay::Stub> stub_;
   absl::Mutex mutex_;
   std::set<grpc::ClientContext*> contexts_ ABSL_GUARDED_BY(mutex_);  // of the calls under way

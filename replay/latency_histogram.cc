@@ -18,7 +18,8 @@ constexpr double kBucketsPerDoubling = 4;
 }  // namespace
 
 void LatencyHistogram::Record(absl::Duration duration) {
-  const double us = std::max(absl::ToDoubleMicroseconds(duration), 1.0);
+  constexpr double kLongest = 4e9;  // microseconds; of the last bucket
+  const double us = std::clamp(absl::ToDoubleMicroseconds(duration), 1.0, kLongest);
   const int bucket = std::min(static_cast<int>(std::log2(us) * kBucketsPerDoubling), kBuckets - 1);
   buckets_[static_cast<std::size_t>(bucket)].fetch_add(1, std::memory_order_relaxed);
 }

@@ -1,9 +1,12 @@
 #include "replay/replay_server.h"
 
+#include <unistd.h>
+
 #include <chrono>
 #include <utility>
 #include <vector>
 
+#include "absl/cleanup/cleanup.h"
 #include "core/status_macros.h"
 
 namespace dbr {
@@ -29,6 +32,10 @@ ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& la
 
 absl::StatusOr<std::unique_ptr<ReplayServer>> ReplayServer::Start(const ReplayServerOptions& options) {
   ASSIGN_OR_RETURN(std::unique_ptr<TransitionStore> store, TransitionStore::Open(options.store));
+  // A start that fails leaves no empty store behind, which the next start would refuse to overwrite.
+  absl::Cleanup remove_new_store = [&store_options = options.store] {
+    if (!store_options.resume && !store_options.path.empty()) unlink(store_options.path.c_str());
+  };
   const std::uint64_t recovered = store->size(), torn = store->torn();
   ASSIGN_OR_RETURN(std::unique_ptr<PartitionedBuffer> buffer,
                    PartitionedBuffer::Make(std::move(store), options.buffer));
@@ -37,6 +44,7 @@ absl::StatusOr<std::unique_ptr<ReplayServer>> ReplayServer::Start(const ReplaySe
   server->torn_ = torn;
   const std::vector<grpc::Service*> services = {&server->service_};
   ASSIGN_OR_RETURN(server->running_, StartServer(options.server, services));
+  std::move(remove_new_store).Cancel();
   return server;
 }
 

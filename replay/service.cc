@@ -32,7 +32,8 @@ absl::Time WaitDeadline(const grpc::ServerContext& context, const SampleRequest&
   const absl::Time call_deadline = absl::FromChrono(context.deadline());
   const absl::Duration margin = std::min(absl::Milliseconds(100), (call_deadline - now) / 10);
   if (!request.has_wait_s()) return call_deadline - margin;
-  return std::min(call_deadline - margin, now + absl::Seconds(std::max(request.wait_s(), 0.0)));
+  const double wait_s = request.wait_s() > 0 ? request.wait_s() : 0;  // not a number: 0
+  return std::min(call_deadline - margin, now + absl::Seconds(wait_s));
 }
 
 void AddLatency(const char* call, const LatencyHistogram& histogram, StatsReply* reply) {

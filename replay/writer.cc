@@ -271,6 +271,10 @@ class TransitionWriter::Impl {
   // One stream from its opening to its end.
   absl::Status RunStream() ABSL_LOCKS_EXCLUDED(mutex_) {
     grpc::ClientContext context;
+    // The first try fails at once where nobody answers, and so the loss is said. Later ones wait inside the
+    // call: only a thread that waits there notices at once that the channel, which tries again and again by
+    // itself, has got through.
+    context.set_wait_for_ready(lost_);
     {
       absl::MutexLock lock(&mutex_);
       if (closed_) return absl::CancelledError("the writer is closed");

@@ -31,8 +31,8 @@ absl::StatusOr<std::unique_ptr<Selector>> MakeSelector(absl::string_view name, s
   for (const Entry& entry : kSelectors) {
     if (entry.name == name) return entry.make(capacity);
   }
-  return absl::InvalidArgumentError(
-      absl::StrCat("selector: expected one of ", absl::StrJoin(SelectorNames(), ", "), ", found '", name, "'"));
+  return absl::InvalidArgumentError(absl::StrCat(
+      "selector: expected one of ", absl::StrJoin(SelectorNames(), ", "), ", found '", name, "'"));
 }
 
 }  // namespace dbr

@@ -1,11 +1,11 @@
 // Transitions that tests can recognise.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cstdint>
 #include <string>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 #include "core/transition.h"
 #include "replay/buffer_types.h"
@@ -17,7 +17,8 @@ inline constexpr TransitionLayout kSmallLayout{.observation_width = 4, .action_w
 // Columns of transitions first, first + 1, ...: every value of transition i follows from i.
 class Rows {
  public:
-  Rows(const TransitionLayout& layout, std::uint64_t first, int count, float advantage = kUnjudged) : layout_(layout) {
+  Rows(const TransitionLayout& layout, std::uint64_t first, int count, float advantage = kUnjudged)
+      : layout_(layout) {
     for (std::uint64_t i = first; i < first + static_cast<std::uint64_t>(count); ++i) Add(i, advantage);
   }
 
@@ -37,7 +38,8 @@ class Rows {
             .critic_versions = critic_versions.data()};
   }
 
-  std::vector<float> observations, actions, masks, rewards, discounts, next_observations, next_masks, advantages;
+  std::vector<float> observations, actions, masks, rewards, discounts, next_observations, next_masks,
+      advantages;
   std::vector<std::uint64_t> critic_versions;
 
  private:
