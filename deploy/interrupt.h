@@ -1,0 +1,42 @@
+// Ctrl-C in a command that has nothing to save.
+#pragma once
+
+#include <atomic>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+#include "core/shutdown.h"
+
+namespace dbr {
+
+// The exit status of a command that was interrupted, as shells have it.
+inline constexpr int kInterruptedExit = 130;
+
+// Remembers SIGINT and SIGTERM from its construction on; BlockShutdownSignals() comes first. Thread-safe.
+class Interrupt {
+ public:
+  Interrupt() : watcher_([this] { Set(); }) {}
+
+  const std::atomic<bool>& flag() const { return flag_; }
+
+  // Blocks for `duration` or until the signal; true where it came.
+  bool WaitFor(absl::Duration duration) {
+    absl::MutexLock lock(&mutex_);
+    return mutex_.AwaitWithTimeout(absl::Condition(&set_), duration);
+  }
+
+ private:
+  void Set() {
+    flag_ = true;
+    absl::MutexLock lock(&mutex_);
+    set_ = true;
+  }
+
+  std::atomic<bool> flag_ = false;
+  absl::Mutex mutex_;
+  bool set_ ABSL_GUARDED_BY(mutex_) = false;
+  ShutdownWatcher watcher_;  // last: its thread uses the members above
+};
+
+}  // namespace dbr

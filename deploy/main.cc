@@ -1,0 +1,34 @@
+// dbr: launches runs, and asks about them.
+#include <CLI/CLI.hpp>
+
+#include "core/shutdown.h"
+#include "deploy/command_line.h"
+#include "nn/blas_threads.h"
+
+namespace {
+
+int Main(int argc, char** argv) {
+  CLI::App app("Dual Behavior Regularized reinforcement learning: trains, watches and examines policies.",
+               "dbr");
+  app.require_subcommand(1);
+  app.footer("Each command has its own --help. Start with: dbr launch deploy/configs/connect4.textproto");
+  int exit_code = 0;
+  dbr::AddLaunch(&app, &exit_code);
+  dbr::AddStats(&app, &exit_code);
+  dbr::AddEvaluate(&app, &exit_code);
+  dbr::AddProbe(&app, &exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  dbr::RestartWithOneBlasThread(argv);  // and so do the programs that we start
+  dbr::BlockShutdownSignals();
+  return Main(argc, argv);
+}

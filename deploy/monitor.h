@@ -1,0 +1,55 @@
+// What the services say about a run, asked again and again.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+#include "proto/policy.grpc.pb.h"
+#include "proto/replay.pb.h"
+#include "replay/client.h"
+
+namespace dbr {
+
+// The newest answers; they stay while a service is away.
+struct RunSample {
+  std::optional<StatsReply> replay;
+  std::optional<LearnerStatus> learner;
+  bool replay_away = false;
+  bool learner_away = false;
+};
+
+// Asks both services every `period` in a thread of its own. Thread-safe.
+class RunMonitor {
+ public:
+  // `on_sample` is called from the monitor's thread after each round; it must not block.
+  RunMonitor(const std::string& replay_address, const std::string& learner_address, absl::Duration period,
+             std::function<void()> on_sample);
+  ~RunMonitor();  // joins; blocks for one round's timeout at most
+  RunMonitor(const RunMonitor&) = delete;
+  RunMonitor& operator=(const RunMonitor&) = delete;
+
+  RunSample Latest() const;
+
+  // One more round now, in the calling thread; blocks for at most `timeout` for each service.
+  RunSample Ask(absl::Duration timeout);
+
+ private:
+  void Run();
+
+  ReplayClient replay_;
+  const std::unique_ptr<Policy::Stub> learner_;
+  const absl::Duration period_;
+  const std::function<void()> on_sample_;
+  mutable absl::Mutex mutex_;
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
+  RunSample latest_ ABSL_GUARDED_BY(mutex_);
+  std::thread thread_;
+};
+
+}  // namespace dbr

@@ -1,0 +1,191 @@
+#include "deploy/run_plan.h"
+
+#include <fcntl.h>
+#include <google/protobuf/util/message_differencer.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <filesystem>
+#include <thread>
+#include <utility>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "core/file_io.h"
+#include "core/status_macros.h"
+#include "proto/config_file.h"
+
+namespace dbr {
+namespace {
+
+// An address that the launcher can hand to others before the server listens.
+absl::StatusOr<std::string> Address(const std::string& configured, const std::string& otherwise,
+                                    const char* field) {
+  if (configured.empty()) return otherwise;
+  if (!absl::EndsWith(configured, ":0")) return configured;
+  return absl::InvalidArgumentError(
+      absl::StrCat(field, ": expected an address that the other processes can be told, found '", configured,
+                   "'. Name a port, or leave it out for a unix socket."));
+}
+
+std::string DefaultRunDir(const Config& config, absl::Time now) {
+  return absl::StrCat("runs/", config.env().name(), "-", AlgorithmName(config), "-",
+                      absl::FormatTime("%Y%m%d-%H%M%S", now, absl::LocalTimeZone()));
+}
+
+absl::Status MakeFolder(const RunFolder& folder) {
+  for (const std::string& path : {folder.root, folder.logs(), folder.checkpoints(), folder.policies()}) {
+    std::error_code error;
+    std::filesystem::create_directories(path, error);
+    if (error) return ErrnoStatus(error.value(), "cannot create", path);
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Config> LoadForLaunch(const LaunchOptions& options) {
+  if (!options.config.empty()) return LoadConfig(options.config, options.overrides);
+  if (options.resume && !options.run_dir.empty()) {
+    return LoadConfig(RunFolder{options.run_dir}.config(), options.overrides);
+  }
+  return absl::InvalidArgumentError(
+      "which run? Give a config file (for example deploy/configs/connect4.textproto), or --resume with "
+      "--run-dir.");
+}
+
+absl::Status CheckResumable(const RunFolder& folder, const Config& config) {
+  if (!std::filesystem::exists(folder.config())) {
+    return absl::NotFoundError(absl::StrCat("--resume: '", folder.root,
+                                            "' is no run folder: it has no config.textproto. ",
+                                            "Name the folder that an earlier launch printed."));
+  }
+  ASSIGN_OR_RETURN(const Config before, LoadConfig(folder.config()));
+  const absl::Status same = CheckSameRun(before, config);
+  if (same.ok()) return same;
+  return absl::InvalidArgumentError(
+      absl::StrCat("--resume: '", folder.root, "' holds another run: ", same.message()));
+}
+
+// What differs between two messages of one type, as "path: before -> now" lines.
+std::string Differences(const google::protobuf::Message& before, const google::protobuf::Message& now) {
+  google::protobuf::util::MessageDifferencer differencer;
+  differencer.set_message_field_comparison(google::protobuf::util::MessageDifferencer::EQUIVALENT);
+  std::string report;
+  differencer.ReportDifferencesToString(&report);
+  return differencer.Compare(before, now) ? "" : report;
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<RunFolderLock>> RunFolderLock::Take(const RunFolder& folder) {
+  const int fd = open(folder.root.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return ErrnoStatus(errno, "cannot open", folder.root);
+  if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    close(fd);
+    return absl::FailedPreconditionError(
+        absl::StrCat("run folder '", folder.root,
+                     "' is in use by another launch. Wait for it or choose another --run-dir."));
+  }
+  return std::unique_ptr<RunFolderLock>(new RunFolderLock(fd));
+}
+
+RunFolderLock::~RunFolderLock() {
+  close(fd_);
+}
+
+absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now) {
+  RunPlan plan;
+  if (options.resume && options.run_dir.empty()) {
+    return absl::InvalidArgumentError("--resume: which run? Name its folder with --run-dir.");
+  }
+  ASSIGN_OR_RETURN(plan.config, LoadForLaunch(options));
+  plan.folder.root = options.run_dir.empty() ? DefaultRunDir(plan.config, now) : options.run_dir;
+  plan.config_source = options.config.empty() ? plan.folder.config() : options.config;
+  plan.resume = options.resume;
+  if (plan.resume) {
+    RETURN_IF_ERROR(CheckResumable(plan.folder, plan.config));
+  } else if (std::filesystem::exists(plan.folder.root) && !std::filesystem::is_empty(plan.folder.root)) {
+    return absl::AlreadyExistsError(
+        absl::StrCat("run folder '", plan.folder.root,
+                     "' exists already. Say --resume to continue it, or choose another --run-dir."));
+  }
+  ASSIGN_OR_RETURN(plan.replay_address,
+                   Address(plan.config.replay().address(), plan.folder.replay_address(), "replay.address"));
+  ASSIGN_OR_RETURN(plan.learner_address, Address(plan.config.learner().address(),
+                                                 plan.folder.learner_address(), "learner.address"));
+  const int configured = static_cast<int>(plan.config.actor().processes());
+  plan.actors =
+      configured > 0 ? configured : DefaultActors(static_cast<int>(std::thread::hardware_concurrency()));
+  RETURN_IF_ERROR(MakeFolder(plan.folder));
+  ASSIGN_OR_RETURN(plan.lock, RunFolderLock::Take(plan.folder));
+  RETURN_IF_ERROR(WriteFileAtomically(plan.folder.config(), PrintConfig(plan.config)));
+  return plan;
+}
+
+std::vector<ProcessSpec> Processes(const RunPlan& plan, const std::string& programs) {
+  const std::vector<std::string> common = {"--config", plan.folder.config(), "--run-dir", plan.folder.root};
+  const auto spec = [&](const std::string& name, const char* program, std::vector<std::string> arguments,
+                        int rank) {
+    ProcessSpec process;
+    process.name = name;
+    process.log = plan.folder.log(name);
+    process.command = {absl::StrCat(programs, "/", program)};
+    process.command.insert(process.command.end(), common.begin(), common.end());
+    process.command.insert(process.command.end(), arguments.begin(), arguments.end());
+    process.stop_rank = rank;
+    return process;
+  };
+  std::vector<ProcessSpec> all = {
+      spec("replay", "dbr-replay", {"--address", plan.replay_address}, kStopReplay),
+      spec("learner", "dbr-learner", {"--replay", plan.replay_address, "--address", plan.learner_address},
+           kStopLearner)};
+  const bool insecure[] = {plan.config.replay().allow_insecure(), plan.config.learner().allow_insecure()};
+  for (int i = 0; i < 2; ++i) {
+    if (insecure[i]) all[i].command.push_back("--allow-insecure");
+    if (plan.resume) all[i].command.push_back("--resume");
+    all[i].restart_arguments = {"--resume"};
+  }
+  const std::vector<std::string> services = {"--replay", plan.replay_address, "--learner",
+                                             plan.learner_address};
+  const auto actor = [&](const std::string& name, int index, bool evaluate) {
+    std::vector<std::string> arguments = {"--index", absl::StrCat(index)};
+    arguments.insert(arguments.end(), services.begin(), services.end());
+    if (evaluate) arguments.push_back("--evaluate");
+    return spec(name, "dbr-actor", std::move(arguments), kStopActors);
+  };
+  for (int i = 0; i < plan.actors; ++i)
+    all.push_back(actor(absl::StrCat("actor-", i), i, /*evaluate=*/false));
+  all.push_back(actor("evaluator", 0, /*evaluate=*/true));
+  return all;
+}
+
+int DefaultActors(int cores) {
+  return std::max(1, cores / 2);
+}
+
+std::string AlgorithmName(const Config& config) {
+  const auto* oneof = AlgorithmConfig::descriptor()->FindOneofByName("algorithm");
+  const auto* chosen = config.algorithm().GetReflection()->GetOneofFieldDescriptor(config.algorithm(), oneof);
+  return chosen == nullptr ? "dbr" : chosen->name();
+}
+
+absl::Status CheckSameRun(const Config& before, const Config& now) {
+  // Through the printed form, in which every default stands written.
+  ASSIGN_OR_RETURN(const Config a, ParseConfig(PrintConfig(before)));
+  ASSIGN_OR_RETURN(const Config b, ParseConfig(PrintConfig(now)));
+  std::string differing;
+  absl::StrAppend(&differing, Differences(a.env(), b.env()));
+  absl::StrAppend(&differing, Differences(a.network(), b.network()));
+  absl::StrAppend(&differing, Differences(a.algorithm(), b.algorithm()));
+  if (a.replay().capacity() != b.replay().capacity()) {
+    absl::StrAppend(&differing, "modified: replay.capacity: ", a.replay().capacity(), " -> ",
+                    b.replay().capacity(), "\n");
+  }
+  if (differing.empty()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("these fields differ from its config.textproto (before -> now):\n", differing,
+                   "Resume without the new values, or start a new run."));
+}
+
+}  // namespace dbr

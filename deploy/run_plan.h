@@ -1,0 +1,71 @@
+// What a launch is going to do: its config, its folder, its processes.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+#include "core/run_folder.h"
+#include "deploy/supervisor.h"
+#include "proto/config.pb.h"
+
+namespace dbr {
+
+struct LaunchOptions {
+  std::string config;                  // a file; empty with `resume`: the run folder's own
+  std::vector<std::string> overrides;  // path=value
+  std::string run_dir;                 // empty: runs/ENV-ALGORITHM-DATE-TIME
+  bool resume = false;
+};
+
+// Who uses a run folder; freed with the object, or by the kernel when the process dies.
+class RunFolderLock {
+ public:
+  // FailedPrecondition where another launch uses the folder.
+  static absl::StatusOr<std::unique_ptr<RunFolderLock>> Take(const RunFolder& folder);
+  ~RunFolderLock();
+
+ private:
+  explicit RunFolderLock(int fd) : fd_(fd) {}
+  int fd_;
+};
+
+struct RunPlan {
+  Config config;
+  std::string config_source;  // the file that the config came from
+  RunFolder folder;
+  bool resume = false;
+  int actors = 1;
+  std::string replay_address;
+  std::string learner_address;
+  std::unique_ptr<RunFolderLock> lock;
+};
+
+// Loads and checks the config, makes the folder or checks that it can be continued, and writes the effective
+// config. Errors: InvalidArgument for a bad config, or one that differs from the folder's where that would
+// not continue the same run (each field is named); AlreadyExists where the folder is there and `resume` was
+// not said; NotFound where there is nothing to resume; FailedPrecondition where another launch uses the
+// folder.
+absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now);
+
+// In which order processes are stopped: each saves its state while what it needs is still there.
+enum StopRank { kStopActors, kStopLearner, kStopReplay };
+
+// Replay, learner, actors and evaluator, in the order in which they start. `programs`: the folder of the
+// programs.
+std::vector<ProcessSpec> Processes(const RunPlan& plan, const std::string& programs);
+
+// Actor processes for a machine of `cores`: half of them, for the learner, the replay and the evaluator want
+// the others.
+int DefaultActors(int cores);
+
+// "dbr", also where the config leaves the algorithm out.
+std::string AlgorithmName(const Config& config);
+
+// InvalidArgument, naming every field that differs, unless a run of `before` can go on under `now`.
+absl::Status CheckSameRun(const Config& before, const Config& now);
+
+}  // namespace dbr

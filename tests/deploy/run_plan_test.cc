@@ -1,0 +1,166 @@
+// What a launch prepares before the first process starts.
+#include "deploy/run_plan.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "core/file_io.h"
+#include "proto/config_file.h"
+#include "tests/temp_dir.h"
+
+namespace dbr {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsSupersetOf;
+using ::testing::Not;
+
+const absl::Time kNow = absl::FromUnixSeconds(1700000000);
+
+class RunPlanTest : public testing::Test {
+ protected:
+  RunPlanTest() {
+    EXPECT_TRUE(WriteFileAtomically(config_, "env { name: 'connect4' } replay { capacity: 5000 }").ok());
+  }
+
+  LaunchOptions Options(std::vector<std::string> overrides = {}, bool resume = false) const {
+    return {.config = config_, .overrides = std::move(overrides), .run_dir = run_, .resume = resume};
+  }
+
+  TempDir folder_;
+  const std::string config_ = folder_ / "config.textproto";
+  const std::string run_ = folder_ / "run";
+};
+
+TEST_F(RunPlanTest, MakesTheFolderWithTheEffectiveConfig) {
+  const auto plan = PrepareRun(Options({"launch.max_seconds=7"}), kNow);
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  const auto written = LoadConfig(plan->folder.config());
+  ASSERT_TRUE(written.ok()) << written.status();
+  EXPECT_EQ(written->launch().max_seconds(), 7);
+  EXPECT_EQ(written->replay().capacity(), 5000);
+  EXPECT_TRUE(std::filesystem::is_directory(plan->folder.logs()));
+  EXPECT_EQ(plan->replay_address, plan->folder.replay_address());
+}
+
+TEST_F(RunPlanTest, NamesTheFolderAfterTheRun) {
+  std::filesystem::current_path(folder_.path());
+  LaunchOptions options = Options();
+  options.run_dir.clear();
+  const auto plan = PrepareRun(options, kNow);
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  EXPECT_EQ(plan->folder.root, absl::StrCat("runs/connect4-dbr-",
+                                            absl::FormatTime("%Y%m%d-%H%M%S", kNow, absl::LocalTimeZone())));
+}
+
+TEST_F(RunPlanTest, RefusesAFolderThatExistsWithoutResume) {
+  ASSERT_TRUE(PrepareRun(Options(), kNow).ok());
+  const auto again = PrepareRun(Options(), kNow);
+  EXPECT_EQ(again.status().code(), absl::StatusCode::kAlreadyExists);
+  EXPECT_THAT(std::string(again.status().message()), AllOf(HasSubstr(run_), HasSubstr("--resume")));
+}
+
+TEST_F(RunPlanTest, ABadConfigMakesNoFolder) {
+  const auto plan = PrepareRun(Options({"replay.capacity=0", "actor.envs=0"}), kNow);
+  EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(plan.status().message()),
+              AllOf(HasSubstr("replay.capacity"), HasSubstr("actor.envs")));
+  EXPECT_FALSE(std::filesystem::exists(run_));
+}
+
+TEST_F(RunPlanTest, ResumesUnderOtherLimits) {
+  ASSERT_TRUE(PrepareRun(Options({"launch.max_seconds=7"}), kNow).ok());
+  const auto plan = PrepareRun(Options({"launch.max_seconds=9"}, true), kNow);
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  EXPECT_EQ(LoadConfig(plan->folder.config())->launch().max_seconds(), 9);
+}
+
+TEST_F(RunPlanTest, ResumesWithTheFoldersOwnConfig) {
+  ASSERT_TRUE(PrepareRun(Options({"launch.max_seconds=7"}), kNow).ok());
+  LaunchOptions options = Options({}, true);
+  options.config.clear();
+  const auto plan = PrepareRun(options, kNow);
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  EXPECT_EQ(plan->config.launch().max_seconds(), 7);
+}
+
+TEST_F(RunPlanTest, RefusesToResumeAnotherRunAndNamesTheFields) {
+  ASSERT_TRUE(PrepareRun(Options(), kNow).ok());
+  const std::string before = *ReadFile(RunFolder{run_}.config());
+  const auto plan = PrepareRun(Options({"replay.capacity=6000", "network.hidden_sizes=[64, 64]",
+                                        "algorithm.dbr.epsilon=0.1", "seed=5"},
+                                       true),
+                               kNow);
+  EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(plan.status().message()),
+              AllOf(HasSubstr("replay.capacity: 5000 -> 6000"), HasSubstr("hidden_sizes"),
+                    HasSubstr("epsilon"), Not(HasSubstr("seed"))));
+  EXPECT_EQ(*ReadFile(RunFolder{run_}.config()), before);
+}
+
+TEST_F(RunPlanTest, RefusesToResumeWhatIsNoRunFolder) {
+  std::filesystem::create_directory(run_);
+  const auto plan = PrepareRun(Options({}, true), kNow);
+  EXPECT_EQ(plan.status().code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(std::string(plan.status().message()), HasSubstr("no config.textproto"));
+}
+
+TEST_F(RunPlanTest, RefusesAFolderInUse) {
+  const auto plan = PrepareRun(Options(), kNow);
+  ASSERT_TRUE(plan.ok());
+  const auto second = PrepareRun(Options({}, true), kNow);
+  EXPECT_EQ(second.status().code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(second.status().message()), HasSubstr("in use by another launch"));
+}
+
+TEST_F(RunPlanTest, RefusesAnAddressThatNobodyCouldBeTold) {
+  const auto plan = PrepareRun(Options({"replay.address='127.0.0.1:0'"}), kNow);
+  EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(plan.status().message()), HasSubstr("replay.address"));
+}
+
+TEST_F(RunPlanTest, StartsTheServicesBeforeThoseWhoUseThem) {
+  auto plan = PrepareRun(Options({"actor.processes=2"}), kNow);
+  ASSERT_TRUE(plan.ok());
+  std::vector<std::string> names;
+  for (const ProcessSpec& process : Processes(*plan, "bin")) {
+    names.push_back(process.name);
+    EXPECT_THAT(process.command, IsSupersetOf({std::string("--config"), plan->folder.config(),
+                                               std::string("--run-dir"), run_}));
+    EXPECT_THAT(process.command, Not(Contains("--resume")));
+  }
+  EXPECT_EQ(names, (std::vector<std::string>{"replay", "learner", "actor-0", "actor-1", "evaluator"}));
+  plan->resume = true;
+  const std::vector<ProcessSpec> resumed = Processes(*plan, "bin");
+  EXPECT_THAT(resumed[0].command, Contains("--resume"));
+  EXPECT_THAT(resumed[1].command, Contains("--resume"));
+  EXPECT_EQ(resumed[0].command[0], "bin/dbr-replay");
+  EXPECT_THAT(resumed[3].command, IsSupersetOf({"--index", "1"}));
+  EXPECT_THAT(resumed[4].command, Contains("--evaluate"));
+  EXPECT_LT(resumed[2].stop_rank, resumed[1].stop_rank);
+  EXPECT_LT(resumed[1].stop_rank, resumed[0].stop_rank);
+}
+
+TEST(DefaultActorsTest, LeavesCoresToTheServices) {
+  EXPECT_EQ(DefaultActors(1), 1);
+  EXPECT_EQ(DefaultActors(2), 1);
+  EXPECT_EQ(DefaultActors(8), 4);
+}
+
+TEST(CheckSameRunTest, ADefaultThatIsWrittenOutIsNoDifference) {
+  Config before, now;
+  now.mutable_algorithm()->mutable_dbr()->set_epsilon(0.05);
+  now.mutable_env()->set_name("connect4");
+  before.mutable_algorithm()->mutable_dbr();
+  EXPECT_TRUE(CheckSameRun(before, now).ok()) << CheckSameRun(before, now);
+}
+
+}  // namespace
+}  // namespace dbr
