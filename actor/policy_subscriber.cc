@@ -154,7 +154,7 @@ void PolicySubscriber::SayLoss(const absl::Status& status) {
 }
 
 void PolicySubscriber::SayReturn() {
-  if (std::exchange(said_, false)) spdlog::info("the learner at {} sends policies again", options_.address);
+  if (std::exchange(said_, false)) spdlog::info("the learner at {} sends policies", options_.address);
 }
 
 }  // namespace dbr
