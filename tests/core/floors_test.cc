@@ -75,7 +75,7 @@ std::string Violation(const std::string& path, const std::string& included) {
   if (IsMain(path)) return "";
   const Room* from = RoomOf(path);
   if (from == nullptr) return path + " belongs to no room";
-  if ((from->name == "algorithms" || from->name == "nn") && IsOutsideWorld(included)) {
+  if (from->name == "algorithms" && IsOutsideWorld(included)) {
     return path + " (" + Describe(*from) + ") includes " + included + ": no network, clock or file there";
   }
   if (from->floor <= 1 && from->name != "wire" && included.rfind("grpcpp/", 0) == 0) {
