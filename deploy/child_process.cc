@@ -23,9 +23,11 @@ constexpr int kCannotExec = 127;
   if (getppid() != parent) _exit(kCannotExec);  // it died before the line above
   // A group that a terminal's Ctrl-C does not reach: the launcher stops its children in order.
   if (setpgid(0, group) != 0) setpgid(0, 0);
-  sigset_t none;
-  sigemptyset(&none);
-  sigprocmask(SIG_SETMASK, &none, nullptr);
+  sigset_t blocked;
+  sigemptyset(&blocked);
+  sigaddset(&blocked, SIGINT);
+  sigaddset(&blocked, SIGTERM);
+  sigprocmask(SIG_SETMASK, &blocked, nullptr);
   signal(SIGPIPE, SIG_DFL);
   const int null = open("/dev/null", O_RDONLY | O_CLOEXEC);
   dup2(null, STDIN_FILENO);

@@ -23,9 +23,10 @@ struct StartedChild {
 };
 
 // Forks and executes. The child gets SIGTERM when the calling THREAD ends: call it from one that lives as
-// long as the process. Does not block. Errors: NotFound or PermissionDenied where the log cannot be opened,
-// Internal where there are too many processes; a program that cannot be executed says so in its log and exits
-// with status 127.
+// long as the process. It starts with SIGINT and SIGTERM blocked, as our programs keep them
+// (core/shutdown.h): one that comes early waits until the program asks for it. Does not block. Errors:
+// NotFound or PermissionDenied where the log cannot be opened, Internal where there are too many processes; a
+// program that cannot be executed says so in its log and exits with status 127.
 absl::StatusOr<StartedChild> StartChild(const ChildOptions& options);
 
 // "exited with status 1", "was killed by signal 9 (Killed)"; takes what waitpid gave.

@@ -191,7 +191,7 @@ TEST_F(SupervisorTest, StopsOneRankAfterTheOther) {
   EXPECT_EQ(supervisor->pid("actor-0"), 0);
   EXPECT_NE(supervisor->pid("learner"), 0);
   EXPECT_TRUE(supervisor->Stop());
-  EXPECT_THAT(Lines(order), SizeIs(4));
+  ASSERT_THAT(Lines(order), SizeIs(4));
   EXPECT_EQ(Lines(order)[2], "learner");
   EXPECT_EQ(Lines(order)[3], "replay");
   EXPECT_THAT(events_, IsEmpty());
@@ -233,9 +233,6 @@ TEST_F(SupervisorTest, WakeEndsAWait) {
   std::thread other([&] { supervisor->Wake(); });
   EXPECT_TRUE(supervisor->Wait(absl::InfiniteFuture()).ok());
   other.join();
-  const absl::Time deadline = absl::Now() + absl::Milliseconds(5);
-  EXPECT_TRUE(supervisor->Wait(deadline).ok());
-  EXPECT_GE(absl::Now(), deadline);
 }
 
 TEST_F(SupervisorTest, LeavesNoOrphanWhenItIsKilled) {
