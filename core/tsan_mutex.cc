@@ -1,0 +1,198 @@
+// absl::Mutex and absl::CondVar over POSIX ones, for builds with ThreadSanitizer alone.
+//
+// The distribution's Abseil is a shared library that ThreadSanitizer has not instrumented: it sees neither
+// that a Mutex was taken nor that a waiter was woken, and reports every guarded member as a race. A program's
+// own definitions come before a shared library's, so those below take the place of Abseil's, for us and for
+// gRPC. Slower, and readers exclude each other; the contracts are the same.
+#include <pthread.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdint>
+#include <ctime>
+
+#include "absl/synchronization/mutex.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+#include "core/check.h"
+
+// Named by the link options, so that a linker takes this file out of its archive.
+extern "C" const int dbr_tsan_mutex = 1;
+
+namespace dbr {
+namespace {
+
+// What stands behind a Mutex. `changed` wakes those who wait for a condition: any unlock may have made it
+// true.
+struct Lock {
+  pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+  pthread_cond_t changed = PTHREAD_COND_INITIALIZER;
+  int waiting = 0;
+
+  ~Lock() {
+    pthread_cond_destroy(&changed);
+    pthread_mutex_destroy(&mutex);
+  }
+};
+
+struct Signal {
+  pthread_cond_t cond = PTHREAD_COND_INITIALIZER;
+
+  ~Signal() { pthread_cond_destroy(&cond); }
+};
+
+static_assert(sizeof(absl::Mutex) == sizeof(std::atomic<void*>) &&
+              sizeof(absl::CondVar) == sizeof(std::atomic<void*>));
+
+// The one word of a Mutex or CondVar, zero at first, holds the address of what stands behind it.
+template <class Behind>
+std::atomic<Behind*>& WordOf(const void* object) {
+  return *static_cast<std::atomic<Behind*>*>(const_cast<void*>(object));
+}
+
+template <class Behind>
+Behind& Of(const void* object) {
+  std::atomic<Behind*>& word = WordOf<Behind>(object);
+  Behind* found = word.load();
+  if (found != nullptr) return *found;
+  auto* made = new Behind;
+  if (word.compare_exchange_strong(found, made)) return *made;
+  delete made;
+  return *found;
+}
+
+template <class Behind>
+void Destroy(const void* object) {
+  delete WordOf<Behind>(object).exchange(nullptr);
+}
+
+void WakeWaiters(Lock& lock) {
+  if (lock.waiting > 0) pthread_cond_broadcast(&lock.changed);
+}
+
+void LockIt(const absl::Mutex* mutex) {
+  DBR_CHECK(pthread_mutex_lock(&Of<Lock>(mutex).mutex) == 0);
+}
+
+void UnlockIt(const absl::Mutex* mutex) {
+  Lock& lock = Of<Lock>(mutex);
+  WakeWaiters(lock);
+  DBR_CHECK(pthread_mutex_unlock(&lock.mutex) == 0);
+}
+
+// False once `deadline` has passed.
+bool WaitOn(pthread_cond_t* cond, pthread_mutex_t* mutex, absl::Time deadline) {
+  if (deadline == absl::InfiniteFuture()) return pthread_cond_wait(cond, mutex) == 0;
+  const timespec until = absl::ToTimespec(deadline);
+  return pthread_cond_timedwait(cond, mutex, &until) != ETIMEDOUT;
+}
+
+bool AwaitIt(const absl::Mutex* mutex, const absl::Condition& condition, absl::Time deadline) {
+  Lock& lock = Of<Lock>(mutex);
+  bool in_time = true;
+  while (!condition.Eval()) {
+    if (!in_time) return false;
+    WakeWaiters(lock);
+    ++lock.waiting;
+    in_time = WaitOn(&lock.changed, &lock.mutex, deadline);
+    --lock.waiting;
+  }
+  return true;
+}
+
+// True where the deadline passed first, as CondVar::WaitWithDeadline says it.
+bool WaitForSignal(const absl::CondVar* cond_var, const absl::Mutex* mutex, absl::Time deadline) {
+  Lock& lock = Of<Lock>(mutex);
+  WakeWaiters(lock);
+  return !WaitOn(&Of<Signal>(cond_var).cond, &lock.mutex, deadline);
+}
+
+absl::Time After(absl::Duration timeout) {
+  return timeout == absl::InfiniteDuration() ? absl::InfiniteFuture() : absl::Now() + timeout;
+}
+
+}  // namespace
+}  // namespace dbr
+
+namespace absl {
+ABSL_NAMESPACE_BEGIN
+
+Mutex::~Mutex() {
+  dbr::Destroy<dbr::Lock>(this);
+}
+void Mutex::Lock() {
+  dbr::LockIt(this);
+}
+void Mutex::Unlock() {
+  dbr::UnlockIt(this);
+}
+bool Mutex::TryLock() {
+  return pthread_mutex_trylock(&dbr::Of<dbr::Lock>(this).mutex) == 0;
+}
+void Mutex::ReaderLock() {
+  dbr::LockIt(this);
+}
+void Mutex::ReaderUnlock() {
+  dbr::UnlockIt(this);
+}
+bool Mutex::ReaderTryLock() {
+  return pthread_mutex_trylock(&dbr::Of<dbr::Lock>(this).mutex) == 0;
+}
+void Mutex::AssertHeld() const {}
+void Mutex::AssertReaderHeld() const {}
+void Mutex::AssertNotHeld() const {}
+void Mutex::ForgetDeadlockInfo() {}
+void Mutex::EnableDebugLog(const char*) {}
+void Mutex::EnableInvariantDebugging(void (*)(void*), void*) {}
+
+void Mutex::Await(const Condition& condition) {
+  dbr::AwaitIt(this, condition, InfiniteFuture());
+}
+bool Mutex::AwaitWithTimeout(const Condition& condition, Duration timeout) {
+  return dbr::AwaitIt(this, condition, dbr::After(timeout));
+}
+bool Mutex::AwaitWithDeadline(const Condition& condition, Time deadline) {
+  return dbr::AwaitIt(this, condition, deadline);
+}
+void Mutex::LockWhen(const Condition& condition) {
+  LockWhenWithDeadline(condition, InfiniteFuture());
+}
+bool Mutex::LockWhenWithTimeout(const Condition& condition, Duration timeout) {
+  return LockWhenWithDeadline(condition, dbr::After(timeout));
+}
+bool Mutex::LockWhenWithDeadline(const Condition& condition, Time deadline) {
+  dbr::LockIt(this);
+  return dbr::AwaitIt(this, condition, deadline);
+}
+void Mutex::ReaderLockWhen(const Condition& condition) {
+  LockWhenWithDeadline(condition, InfiniteFuture());
+}
+bool Mutex::ReaderLockWhenWithTimeout(const Condition& condition, Duration timeout) {
+  return LockWhenWithDeadline(condition, dbr::After(timeout));
+}
+bool Mutex::ReaderLockWhenWithDeadline(const Condition& condition, Time deadline) {
+  return LockWhenWithDeadline(condition, deadline);
+}
+
+CondVar::~CondVar() {
+  dbr::Destroy<dbr::Signal>(this);
+}
+void CondVar::Wait(Mutex* mutex) {
+  dbr::WaitForSignal(this, mutex, InfiniteFuture());
+}
+bool CondVar::WaitWithTimeout(Mutex* mutex, Duration timeout) {
+  return dbr::WaitForSignal(this, mutex, dbr::After(timeout));
+}
+bool CondVar::WaitWithDeadline(Mutex* mutex, Time deadline) {
+  return dbr::WaitForSignal(this, mutex, deadline);
+}
+void CondVar::Signal() {
+  pthread_cond_signal(&dbr::Of<dbr::Signal>(this).cond);
+}
+void CondVar::SignalAll() {
+  pthread_cond_broadcast(&dbr::Of<dbr::Signal>(this).cond);
+}
+void CondVar::EnableDebugLog(const char*) {}
+
+ABSL_NAMESPACE_END
+}  // namespace absl
