@@ -6,8 +6,6 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/synchronization/mutex.h"
-#include "absl/synchronization/notification.h"
 #include "proto/channel.h"
 #include "proto/grpc_status.h"
 
@@ -34,44 +32,45 @@ absl::Status ReadAnswer(const std::string& address, const grpc::Status& status,
 
 }  // namespace
 
-struct HealthCheck::Call {
-  explicit Call(const std::string& address) : stub(MakeChannel(address)) {}
-
-  grpc::GenericStub stub;
-  grpc::ClientContext context;
-  grpc::ByteBuffer request{nullptr, 0};
-  grpc::ByteBuffer response;
-  absl::Notification done;
-  mutable absl::Mutex mutex;
-  std::optional<absl::Status> result ABSL_GUARDED_BY(mutex);
-};
-
-HealthCheck::HealthCheck(const std::string& address, absl::Duration timeout, std::function<void()> on_answer)
-    : call_(std::make_shared<Call>(address)) {
-  const grpc::Slice empty(static_cast<std::size_t>(0));
-  call_->request = grpc::ByteBuffer(&empty, 1);
-  call_->context.set_wait_for_ready(true);
-  SetDeadline(timeout, &call_->context);
-  call_->stub.UnaryCall(
-      &call_->context, "/grpc.health.v1.Health/Check", {}, &call_->request, &call_->response,
-      [call = call_, address, on_answer = std::move(on_answer)](const grpc::Status& status) {
-        {
-          absl::MutexLock lock(&call->mutex);
-          call->result = ReadAnswer(address, status, call->response);
-        }
-        on_answer();
-        call->done.Notify();
-      });
+HealthCheck::HealthCheck(const std::string& address, absl::Duration timeout,
+                         std::function<void()> on_answer) {
+  context_.set_wait_for_ready(true);
+  SetDeadline(timeout, &context_);
+  thread_ = std::thread([this, address, on_answer = std::move(on_answer)] {
+    absl::Status answer = Ask(address);
+    {
+      absl::MutexLock lock(&mutex_);
+      result_ = std::move(answer);
+    }
+    on_answer();
+  });
 }
 
 HealthCheck::~HealthCheck() {
-  call_->context.TryCancel();
-  call_->done.WaitForNotification();
+  context_.TryCancel();
+  thread_.join();
 }
 
 std::optional<absl::Status> HealthCheck::result() const {
-  absl::MutexLock lock(&call_->mutex);
-  return call_->result;
+  absl::MutexLock lock(&mutex_);
+  return result_;
+}
+
+// Blocks until the answer, the deadline or the cancellation.
+absl::Status HealthCheck::Ask(const std::string& address) {
+  grpc::GenericStub stub(MakeChannel(address));
+  grpc::CompletionQueue queue;
+  grpc::ByteBuffer request(nullptr, 0), response;
+  grpc::Status status;
+  const auto call = stub.PrepareUnaryCall(&context_, "/grpc.health.v1.Health/Check", request, &queue);
+  call->StartCall();
+  call->Finish(&response, &status, &status);
+  void* tag = nullptr;
+  bool ok = false;
+  queue.Next(&tag, &ok);
+  queue.Shutdown();
+  while (queue.Next(&tag, &ok)) continue;
+  return ReadAnswer(address, status, response);
 }
 
 }  // namespace dbr

@@ -75,6 +75,7 @@ absl::StatusOr<int> Launch::Run() {
   absl::Status status = StartAll();
   if (status.ok()) status = Train();
   line_.End();
+  if (status.ok()) Say("stopping, and saving everything");
   StopAll(/*ask=*/status.ok());
   if (!status.ok()) {
     summary_.ended = "failed";

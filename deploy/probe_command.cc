@@ -28,7 +28,7 @@ struct ProbeFlags {
 
 absl::Status ProbeMoves(const ProbeFlags& flags, const PolicyNetworks& policy, ActingMode mode) {
   const absl::StatusOr<connect4::Board> board = connect4::Board::FromMoves(*flags.moves);
-  if (!board.ok()) return absl::InvalidArgumentError(absl::StrCat("--moves: ", board.status().message()));
+  if (!board.ok()) return absl::InvalidArgumentError(absl::StrCat("--", board.status().message()));
   ASSIGN_OR_RETURN(const std::vector<ProbedPosition> probed, Probe(policy, {*board}, mode, flags.seed));
   const std::string text =
       flags.json ? ToJson(*flags.moves, probed[0]).dump() + "\n" : Figure(*flags.moves, probed[0]);

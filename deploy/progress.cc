@@ -16,26 +16,31 @@ constexpr int kWidthWithoutTerminal = 200;
 // The opponents whose scores are watched while a run goes on.
 constexpr const char* kWatched[] = {"random", "mcts:10"};
 
-std::string Score(const RunSample& sample, absl::string_view opponent, bool words) {
-  if (sample.learner.has_value()) {
-    for (const EvaluationReport& report : sample.learner->evaluations()) {
-      if (report.opponent() != opponent) continue;
-      const std::string score = Fixed(report.score_mean(), 2);
-      return words ? score : std::string(absl::StripPrefix(score, "0"));
-    }
+const EvaluationReport* FindReport(const LearnerStatus& learner, absl::string_view opponent) {
+  for (const EvaluationReport& report : learner.evaluations()) {
+    if (report.opponent() == opponent) return &report;
   }
-  return "–";
+  return nullptr;
+}
+
+std::string Score(const RunSample& sample, absl::string_view opponent, bool words) {
+  const EvaluationReport* report =
+      sample.learner.has_value() ? FindReport(*sample.learner, opponent) : nullptr;
+  if (report == nullptr) return "–";
+  const std::string score = Fixed(report->score_mean(), 2);
+  return words ? score : std::string(absl::StripPrefix(score, "0"));
 }
 
 // Environments without opponents have one evaluation, with its return.
 std::string Scores(const RunSample& sample, bool words) {
   if (sample.learner.has_value()) {
-    for (const EvaluationReport& report : sample.learner->evaluations()) {
-      if (report.opponent().empty()) return absl::StrCat("return ", Fixed(report.return_mean(), 1));
-    }
+    const EvaluationReport* report = FindReport(*sample.learner, "");
+    if (report != nullptr) return absl::StrCat("return ", Fixed(report->return_mean(), 1));
   }
   std::vector<std::string> parts;
+  const bool any = sample.learner.has_value() && sample.learner->evaluations_size() > 0;
   for (const char* opponent : kWatched) {
+    if (any && !FindReport(*sample.learner, opponent)) continue;  // the config leaves it out
     const std::string name = words ? opponent : absl::StartsWith(opponent, "mcts") ? "mcts" : "rnd";
     parts.push_back(absl::StrCat(name, " ", Score(sample, opponent, words)));
   }

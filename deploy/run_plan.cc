@@ -54,17 +54,31 @@ absl::StatusOr<Config> LoadForLaunch(const LaunchOptions& options) {
       "--run-dir.");
 }
 
+absl::Status CheckRunFolder(const RunFolder& folder) {
+  if (std::filesystem::exists(folder.config())) return absl::OkStatus();
+  return absl::NotFoundError(absl::StrCat("--resume: '", folder.root,
+                                          "' is no run folder: it has no config.textproto. ",
+                                          "Name the folder that an earlier launch printed."));
+}
+
 absl::Status CheckResumable(const RunFolder& folder, const Config& config) {
-  if (!std::filesystem::exists(folder.config())) {
-    return absl::NotFoundError(absl::StrCat("--resume: '", folder.root,
-                                            "' is no run folder: it has no config.textproto. ",
-                                            "Name the folder that an earlier launch printed."));
-  }
   ASSIGN_OR_RETURN(const Config before, LoadConfig(folder.config()));
   const absl::Status same = CheckSameRun(before, config);
   if (same.ok()) return same;
   return absl::InvalidArgumentError(
       absl::StrCat("--resume: '", folder.root, "' holds another run: ", same.message()));
+}
+
+// What must be equal for one run to go on as another, read through the printed form, in which every default
+// stands written.
+absl::StatusOr<Config> Identity(const Config& config) {
+  ASSIGN_OR_RETURN(const Config whole, ParseConfig(PrintConfig(config)));
+  Config identity;
+  *identity.mutable_env() = whole.env();
+  *identity.mutable_network() = whole.network();
+  *identity.mutable_algorithm() = whole.algorithm();
+  identity.mutable_replay()->set_capacity(whole.replay().capacity());
+  return identity;
 }
 
 // What differs between two messages of one type, as "path: before -> now" lines.
@@ -99,6 +113,7 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
   if (options.resume && options.run_dir.empty()) {
     return absl::InvalidArgumentError("--resume: which run? Name its folder with --run-dir.");
   }
+  if (options.resume) RETURN_IF_ERROR(CheckRunFolder(RunFolder{options.run_dir}));
   ASSIGN_OR_RETURN(plan.config, LoadForLaunch(options));
   plan.folder.root = options.run_dir.empty() ? DefaultRunDir(plan.config, now) : options.run_dir;
   plan.config_source = options.config.empty() ? plan.folder.config() : options.config;
@@ -171,17 +186,9 @@ std::string AlgorithmName(const Config& config) {
 }
 
 absl::Status CheckSameRun(const Config& before, const Config& now) {
-  // Through the printed form, in which every default stands written.
-  ASSIGN_OR_RETURN(const Config a, ParseConfig(PrintConfig(before)));
-  ASSIGN_OR_RETURN(const Config b, ParseConfig(PrintConfig(now)));
-  std::string differing;
-  absl::StrAppend(&differing, Differences(a.env(), b.env()));
-  absl::StrAppend(&differing, Differences(a.network(), b.network()));
-  absl::StrAppend(&differing, Differences(a.algorithm(), b.algorithm()));
-  if (a.replay().capacity() != b.replay().capacity()) {
-    absl::StrAppend(&differing, "modified: replay.capacity: ", a.replay().capacity(), " -> ",
-                    b.replay().capacity(), "\n");
-  }
+  ASSIGN_OR_RETURN(const Config a, Identity(before));
+  ASSIGN_OR_RETURN(const Config b, Identity(now));
+  const std::string differing = Differences(a, b);
   if (differing.empty()) return absl::OkStatus();
   return absl::InvalidArgumentError(
       absl::StrCat("these fields differ from its config.textproto (before -> now):\n", differing,

@@ -105,13 +105,17 @@ std::string Writers(const StatsReply& stats) {
   return text;
 }
 
+std::string Latency(double microseconds) {
+  return microseconds < 999.5 ? absl::StrFormat("%.0f us", microseconds)
+                              : absl::StrFormat("%.1f ms", microseconds / 1000);
+}
+
 std::string Calls(const StatsReply& stats) {
   std::string text = "\n";
   if (stats.latencies_size() > 0) text += "calls              count       p50         p99\n";
   for (const LatencyStats& call : stats.latencies()) {
     absl::StrAppend(&text, "  ", PadRight(call.call(), 10), PadLeft(WithCommas(call.count()), 12),
-                    PadLeft(absl::StrCat(Compact(call.p50_us()), " us"), 10),
-                    PadLeft(absl::StrCat(Compact(call.p99_us()), " us"), 12), "\n");
+                    PadLeft(Latency(call.p50_us()), 10), PadLeft(Latency(call.p99_us()), 12), "\n");
   }
   if (stats.blocked_size() == 0) return absl::StrCat(text, "no client waits\n");
   for (const BlockedClients& blocked : stats.blocked()) {

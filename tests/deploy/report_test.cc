@@ -116,7 +116,7 @@ TEST(ProgressTest, SaysEverythingInOneLine) {
   progress.left = absl::Seconds(125);
   const std::string line = ProgressText(progress, 200);
   for (const char* part : {"12,345 games", "5.1k transitions/s", "410 updates/s", "D 100k", "D+ 60k",
-                           "D- 41k", "policy 82 (lag 2)", "random 0.93", "mcts:10 –", "2:05 left"}) {
+                           "D- 41k", "policy 82 (lag 2)", "random 0.93", "2:05 left"}) {
     EXPECT_THAT(line, HasSubstr(part));
   }
 }
@@ -131,6 +131,13 @@ TEST(ProgressTest, FitsATerminalOfEightyColumns) {
   for (const char* part : {"12k games", "+60k", "v82 lag 2", "rnd .93", "2:05"})
     EXPECT_THAT(line, HasSubstr(part));
   EXPECT_LE(DisplayWidth(ProgressText(progress, 30)), 30);
+}
+
+TEST(ProgressTest, ShowsTheWatchedOpponentsThatAreEvaluated) {
+  Progress progress;
+  EXPECT_THAT(ProgressText(progress, 200), AllOf(HasSubstr("random –"), HasSubstr("mcts:10 –")));
+  progress.sample.learner = SomeStatus();
+  EXPECT_THAT(ProgressText(progress, 200), AllOf(HasSubstr("random 0.93"), Not(HasSubstr("mcts:10"))));
 }
 
 TEST(ProgressTest, SaysThatAServiceIsAway) {
@@ -234,7 +241,7 @@ TEST(StatsReportTest, TextShowsEverything) {
   for (const char* part :
        {"unix:run/replay.sock", "100,000", "33% of 300,000", "60% of D", "80.0 MiB", "123,456", "5.1k/s",
         "3.97 samples per insert", "actor-0", "1 client waits to sample: the rate limiter waits", "250 us",
-        "1.2k us", "advantages", "score –"}) {
+        "1.2 ms", "advantages", "score –"}) {
     EXPECT_THAT(text, HasSubstr(part));
   }
 }
