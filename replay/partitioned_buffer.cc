@@ -14,10 +14,6 @@
 namespace dbr {
 namespace {
 
-absl::Status Stopping() {
-  return absl::UnavailableError("the replay server is stopping");
-}
-
 // Sequence numbers beyond this are no writer's; it leaves room for sums.
 constexpr std::uint64_t kMaxSequence = std::uint64_t{1} << 62;
 
@@ -76,7 +72,7 @@ PartitionedBuffer::PartitionedBuffer(std::unique_ptr<TransitionStore> store, con
 
 absl::StatusOr<std::uint32_t> PartitionedBuffer::OpenWriter(const WriterIdentity& identity) {
   absl::MutexLock lock(&mutex_);
-  if (closed_) return Stopping();
+  if (closed_) return absl::UnavailableError("the replay server is stopping");
   return store_->writers().Open(identity);
 }
 
@@ -89,29 +85,6 @@ WriterProgress PartitionedBuffer::Progress(std::uint32_t place) const {
   absl::MutexLock lock(&mutex_);
   const WriterRecord& record = store_->writers().record(place);
   return {record.last_sequence, record.refused};
-}
-
-RateLimiter::Counts PartitionedBuffer::Counts() const {
-  return {store_->inserted(), store_->counters().sampled, store_->size()};
-}
-
-// A draw that waits for an empty partition can only be helped by an insert or a relabel, and who draws may be
-// who relabels: so inserts are free meanwhile.
-bool PartitionedBuffer::CanInsert() const {
-  return limiter_.CanInsert(Counts()) || (waiting_.draws_of_plus > 0 && partitions_.size(kPlus) == 0) ||
-         (waiting_.draws_of_minus > 0 && partitions_.size(kMinus) == 0);
-}
-
-absl::Status PartitionedBuffer::AwaitInsert(absl::Time deadline) {
-  const auto ready = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return closed_ || CanInsert(); };
-  if (!ready()) {
-    ++waiting_.inserts;
-    mutex_.AwaitWithDeadline(absl::Condition(&ready), deadline);
-    --waiting_.inserts;
-  }
-  if (closed_) return Stopping();
-  if (CanInsert()) return absl::OkStatus();
-  return absl::DeadlineExceededError(absl::StrCat("insert: ", limiter_.WhyInsertWaits(Counts())));
 }
 
 bool PartitionedBuffer::SkipRows(std::uint32_t place, const std::vector<bool>& refused, InsertBatch* batch) {
@@ -179,50 +152,6 @@ absl::Status PartitionedBuffer::Insert(std::uint32_t place, InsertBatch* batch, 
     inserts_.Add(now, store_->inserted() - inserted_before);
   }
   return absl::OkStatus();
-}
-
-std::uint64_t PartitionedBuffer::EffectiveDraws(const DrawRequest& request) const {
-  std::uint64_t draws = 0;
-  for (int part = 0; part < kDrawnParts; ++part) {
-    if (!request.allow_empty_partitions || partitions_.size(part) > 0) draws += request.counts[part];
-  }
-  return draws;
-}
-
-bool PartitionedBuffer::CanDraw(const DrawRequest& request) const {
-  if (!limiter_.CanDraw(Counts(), EffectiveDraws(request))) return false;
-  if (request.allow_empty_partitions) return true;
-  return (request.counts[kPlus] == 0 || partitions_.size(kPlus) > 0) &&
-         (request.counts[kMinus] == 0 || partitions_.size(kMinus) > 0);
-}
-
-std::string PartitionedBuffer::WhyDrawWaits(const DrawRequest& request) const {
-  const std::uint64_t draws = EffectiveDraws(request);
-  if (!limiter_.CanDraw(Counts(), draws)) return limiter_.WhyDrawWaits(Counts(), draws);
-  const bool plus = request.counts[kPlus] > 0 && partitions_.size(kPlus) == 0;
-  return absl::StrCat("partition ", plus ? "D+" : "D-", " is empty (of ", partitions_.size(kUniform),
-                      " transitions ", partitions_.size(kUnjudgedPart),
-                      " are not yet judged); set allow_empty_partitions to draw without it");
-}
-
-absl::Status PartitionedBuffer::AwaitDraw(const DrawRequest& request, absl::Time deadline) {
-  const auto ready = [this, &request]()
-                         ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return closed_ || CanDraw(request); };
-  if (!ready()) {
-    const bool must_have = !request.allow_empty_partitions;
-    const bool plus = must_have && request.counts[kPlus] > 0, minus = must_have && request.counts[kMinus] > 0;
-    ++waiting_.draws;
-    waiting_.draws_of_plus += plus;
-    waiting_.draws_of_minus += minus;
-    waiting_.newest_draw = request;
-    mutex_.AwaitWithDeadline(absl::Condition(&ready), deadline);
-    --waiting_.draws;
-    waiting_.draws_of_plus -= plus;
-    waiting_.draws_of_minus -= minus;
-  }
-  if (closed_) return Stopping();
-  if (CanDraw(request)) return absl::OkStatus();
-  return absl::DeadlineExceededError(absl::StrCat("sample: ", WhyDrawWaits(request)));
 }
 
 void PartitionedBuffer::DrawPart(int part, std::uint32_t count, const DrawColumns& out) {

@@ -54,14 +54,6 @@ void PartitionedBuffer::AddWriters(BufferStats* stats) const {
   }
 }
 
-void PartitionedBuffer::AddBlocked(BufferStats* stats) const {
-  if (waiting_.inserts > 0) {
-    stats->blocked.push_back({"insert", waiting_.inserts, limiter_.WhyInsertWaits(Counts())});
-  }
-  if (waiting_.draws > 0)
-    stats->blocked.push_back({"sample", waiting_.draws, WhyDrawWaits(waiting_.newest_draw)});
-}
-
 void PartitionedBuffer::AddEpisodes(BufferStats* stats) const {
   const std::uint64_t count = std::min(store_->counters().episodes, TransitionStore::kRecentEpisodes);
   double returns = 0, scores = 0, lengths = 0;

@@ -1,11 +1,9 @@
 #include "replay/writer.h"
 
 #include <algorithm>
-#include <deque>
 #include <random>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/str_cat.h"
@@ -14,9 +12,9 @@
 #include "core/rng.h"
 #include "core/status_macros.h"
 #include "proto/channel.h"
-#include "proto/codec.h"
 #include "proto/grpc_status.h"
 #include "proto/replay.grpc.pb.h"
+#include "replay/outbox.h"
 #include "spdlog/spdlog.h"
 
 namespace dbr {
@@ -57,25 +55,19 @@ bool IsFinal(const absl::Status& status) {
          status.code() == absl::StatusCode::kPermissionDenied;
 }
 
-std::uint64_t LastSequence(const InsertRequest& message) {
-  return message.first_sequence() + message.transitions().count() - 1;
-}
-
 }  // namespace
 
-// A message is filled by Append, sealed when it is full, old or waited for, sent, and dropped when it is
-// acknowledged:
-//   filling_  ->  sealed_[sent_ ...]  ->  sealed_[0 ... sent_)  ->  gone.
-// A broken stream sets sent_ back to 0. One thread connects and sends; while a stream lives a second one
-// reads replies.
+// One thread connects and sends; while a stream lives a second one reads replies.
 class TransitionWriter::Impl {
  public:
   explicit Impl(WriterOptions options)
       : options_(std::move(options)),
         id_(DrawId()),
-        rows_per_message_(RowsPerMessage(options_)),
-        messages_per_acknowledgement_(std::max(1, options_.window / 4)),
         stub_(Replay::NewStub(MakeChannel(options_.address))),
+        outbox_({.layout = options_.layout,
+                 .rows_per_message = RowsPerMessage(options_),
+                 .window = static_cast<std::size_t>(std::max(1, options_.window)),
+                 .max_batch_age = options_.max_batch_age}),
         jitter_(id_),
         sender_([this] { Run(); }) {}
 
@@ -87,20 +79,20 @@ class TransitionWriter::Impl {
   absl::Status Append(const TransitionView& transition, float advantage, std::uint64_t critic_version,
                       const std::optional<EpisodeEnd>& end, absl::Duration timeout) {
     RETURN_IF_ERROR(CheckWidths(options_.layout, transition));
+    const absl::Time now = absl::Now();
     absl::MutexLock lock(&mutex_);
     const auto has_room = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-      return Ended() || appended_ - acknowledged_ < options_.buffered_transitions;
+      return Ended() || outbox_.appended() - outbox_.acknowledged() < options_.buffered_transitions;
     };
     RETURN_IF_ERROR(Await(has_room, timeout, "append: the buffer of this writer is full"));
-    AppendLocked(transition, advantage, critic_version, end);
+    outbox_.Append(transition, advantage, critic_version, end, now);
     return absl::OkStatus();
   }
 
   absl::Status Flush(absl::Duration timeout) {
     absl::MutexLock lock(&mutex_);
-    const auto all_acknowledged = [this, target = appended_]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-      return Ended() || acknowledged_ >= target;
-    };
+    const auto all_acknowledged = [this, target = outbox_.appended()]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(
+                                      mutex_) { return Ended() || outbox_.acknowledged() >= target; };
     return Await(all_acknowledged, timeout, "flush: not all is acknowledged");
   }
 
@@ -114,7 +106,7 @@ class TransitionWriter::Impl {
 
   WriterCounters counters() const {
     absl::MutexLock lock(&mutex_);
-    return {appended_, acknowledged_, refused_, reconnects_};
+    return {outbox_.appended(), outbox_.acknowledged(), outbox_.refused(), reconnects_};
   }
 
  private:
@@ -135,100 +127,21 @@ class TransitionWriter::Impl {
     if (closed_) return absl::CancelledError("the writer is closed");
     if (ready()) return absl::OkStatus();
     return absl::DeadlineExceededError(absl::StrCat(what, " after ", absl::FormatDuration(timeout), ": ",
-                                                    appended_, " appended, ", acknowledged_,
+                                                    outbox_.appended(), " appended, ", outbox_.acknowledged(),
                                                     " acknowledged by ", options_.address));
   }
 
-  void AppendLocked(const TransitionView& transition, float advantage, std::uint64_t critic_version,
-                    const std::optional<EpisodeEnd>& end) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    if (filling_ == nullptr) StartMessage();
-    ++appended_;
-    TransitionBatch* batch = filling_->mutable_transitions();
-    if (end.has_value()) {
-      EpisodeEndMessage* message = filling_->add_episode_ends();
-      message->set_row(batch->count());
-      message->set_return_(end->episode_return);
-      message->set_score(end->score);
-      message->set_length(static_cast<std::uint32_t>(end->length));
-    }
-    AppendTransition(transition, advantage, critic_version, batch);
-    if (batch->count() == rows_per_message_) Seal();
-  }
-
-  void StartMessage() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    if (spare_.empty()) {
-      filling_ = std::make_shared<InsertRequest>();
-    } else {
-      filling_ = std::move(spare_.back());
-      spare_.pop_back();
-      filling_->Clear();
-    }
-    filling_->set_first_sequence(appended_ + 1);
-    SetLayout(options_.layout, filling_->mutable_transitions());
-    filling_since_ = absl::Now();
-  }
-
-  void Seal() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { sealed_.push_back(std::move(filling_)); }
-
-  // The sender's side: what it may do now.
-  bool WindowOpen() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    return sent_ < static_cast<std::size_t>(options_.window);
-  }
-  bool CanSend() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    return WindowOpen() && sent_ < sealed_.size();
-  }
-  // A message that is not full is worth sending, or an acknowledgement worth asking for, once it is old or
-  // waited for.
-  absl::Time HurryTime() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    if (!WindowOpen() || sent_ < sealed_.size()) return absl::InfiniteFuture();
-    absl::Time since = absl::InfiniteFuture();
-    if (filling_ != nullptr) since = filling_since_;
-    if (sent_unasked_ > 0) since = std::min(since, last_sent_);
-    return callers_waiting_ > 0 && since != absl::InfiniteFuture() ? absl::InfinitePast()
-                                                                   : since + options_.max_batch_age;
-  }
-
-  // The next message to send, or null where the stream is to end.
-  std::shared_ptr<InsertRequest> NextMessage() ABSL_LOCKS_EXCLUDED(mutex_) {
+  // Waits for the next message to send; null where the stream is to end.
+  std::shared_ptr<const InsertRequest> NextMessage() ABSL_LOCKS_EXCLUDED(mutex_) {
     absl::MutexLock lock(&mutex_);
     for (;;) {
-      const absl::Time hurry_time = HurryTime();
-      const auto something_to_do = [this, hurry_time]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-        return closed_ || broken_ || CanSend() || HurryTime() < hurry_time;
+      const absl::Time next_time = outbox_.NextTime(callers_waiting_ > 0);
+      const auto sooner = [this, next_time]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+        return closed_ || broken_ || outbox_.NextTime(callers_waiting_ > 0) < next_time;
       };
-      mutex_.AwaitWithDeadline(absl::Condition(&something_to_do), hurry_time);
+      mutex_.AwaitWithDeadline(absl::Condition(&sooner), next_time);
       if (closed_ || broken_) return nullptr;
-      const bool hurry = !CanSend() && HurryTime() <= absl::Now();
-      if (hurry && filling_ == nullptr) return AcknowledgementRequest();
-      if (hurry) Seal();
-      if (CanSend()) return MarkSent(hurry);
-    }
-  }
-
-  std::shared_ptr<InsertRequest> AcknowledgementRequest() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    auto message = std::make_shared<InsertRequest>();
-    message->set_acknowledge(true);
-    sent_unasked_ = 0;
-    return message;
-  }
-
-  std::shared_ptr<InsertRequest> MarkSent(bool hurry) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    std::shared_ptr<InsertRequest> message = sealed_[sent_++];
-    last_sent_ = absl::Now();
-    ++sent_unasked_;
-    message->set_acknowledge(hurry || sent_unasked_ >= messages_per_acknowledgement_);
-    if (message->acknowledge()) sent_unasked_ = 0;
-    return message;
-  }
-
-  void TakeReply(const InsertReply& reply) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
-    acknowledged_ = std::max(acknowledged_, std::min(reply.acknowledged_sequence(), appended_));
-    refused_ = std::max(refused_, reply.refused());
-    while (!sealed_.empty() && LastSequence(*sealed_.front()) <= acknowledged_) {
-      // The sender may still be writing it.
-      if (sealed_.front().use_count() == 1) spare_.push_back(std::move(sealed_.front()));
-      sealed_.pop_front();
-      if (sent_ > 0) --sent_;
+      if (auto message = outbox_.Next(absl::Now(), callers_waiting_ > 0)) return message;
     }
   }
 
@@ -236,7 +149,7 @@ class TransitionWriter::Impl {
     InsertReply reply;
     while (stream->Read(&reply)) {
       absl::MutexLock lock(&mutex_);
-      TakeReply(reply);
+      outbox_.Acknowledge(reply);
     }
     absl::MutexLock lock(&mutex_);
     broken_ = true;
@@ -254,11 +167,10 @@ class TransitionWriter::Impl {
     {
       absl::MutexLock lock(&mutex_);
       broken_ = false;
-      sent_ = 0;
-      sent_unasked_ = 0;
-      TakeReply(reply);
+      outbox_.Restart();
+      outbox_.Acknowledge(reply);
       if (lost_) ++reconnects_;
-      resend = appended_ - acknowledged_;
+      resend = outbox_.appended() - outbox_.acknowledged();
     }
     if (std::exchange(lost_, false)) {
       spdlog::info(
@@ -305,12 +217,12 @@ class TransitionWriter::Impl {
       }
       if (IsFinal(status)) {
         spdlog::error("{}: the replay server at {} refuses this writer: {}", options_.name, options_.address,
-                      status.ToString());
+                      std::string(status.message()));
         return;
       }
       if (!std::exchange(lost_, true)) {
         spdlog::warn("{}: no stream to the replay server at {}: {}. Trying again until it is there.",
-                     options_.name, options_.address, status.ToString());
+                     options_.name, options_.address, std::string(status.message()));
       }
       BackOff();
     }
@@ -326,21 +238,10 @@ class TransitionWriter::Impl {
 
   const WriterOptions options_;
   const std::uint64_t id_;
-  const std::size_t rows_per_message_;
-  const int messages_per_acknowledgement_;
   const std::unique_ptr<Replay::Stub> stub_;
 
   mutable absl::Mutex mutex_;
-  std::shared_ptr<InsertRequest> filling_ ABSL_GUARDED_BY(mutex_);
-  absl::Time filling_since_ ABSL_GUARDED_BY(mutex_);
-  std::deque<std::shared_ptr<InsertRequest>> sealed_ ABSL_GUARDED_BY(mutex_);  // not acknowledged, in order
-  std::vector<std::shared_ptr<InsertRequest>> spare_ ABSL_GUARDED_BY(mutex_);  // to be filled again
-  std::size_t sent_ ABSL_GUARDED_BY(mutex_) = 0;                               // of sealed_, on this stream
-  int sent_unasked_ ABSL_GUARDED_BY(mutex_) = 0;  // since the last that asks for an acknowledgement
-  absl::Time last_sent_ ABSL_GUARDED_BY(mutex_);
-  std::uint64_t appended_ ABSL_GUARDED_BY(mutex_) = 0;
-  std::uint64_t acknowledged_ ABSL_GUARDED_BY(mutex_) = 0;
-  std::uint64_t refused_ ABSL_GUARDED_BY(mutex_) = 0;
+  Outbox outbox_ ABSL_GUARDED_BY(mutex_);
   std::uint64_t reconnects_ ABSL_GUARDED_BY(mutex_) = 0;
   int callers_waiting_ ABSL_GUARDED_BY(mutex_) = 0;
   bool broken_ ABSL_GUARDED_BY(mutex_) = false;  // the stream has ended

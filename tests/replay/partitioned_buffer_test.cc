@@ -328,19 +328,24 @@ TEST_F(Buffer, InsertsAreFreeWhileADrawWaitsForAnEmptyPartition) {
   learner.join();
 }
 
-TEST_F(Buffer, CloseEndsAllWaits) {
+TEST_F(Buffer, CloseEndsTheWaitOfAnInsert) {
   buffer_options_.limiter = {.samples_per_insert = 1, .tolerance = 10, .min_size = 10};
   Make();
   ASSERT_FALSE(Insert(1, 100).ok());
   std::thread writer(
       [this] { EXPECT_EQ(Insert(500, 10, 1, kNever).code(), absl::StatusCode::kUnavailable); });
-  std::thread learner([this] {
-    EXPECT_EQ(Draw(1, 0, 1, /*allow_empty=*/false, kNever).code(), absl::StatusCode::kUnavailable);
-  });
   buffer_->Close();
   writer.join();
-  learner.join();
   EXPECT_EQ(buffer_->OpenWriter({.id = 5, .name = "late"}).status().code(), absl::StatusCode::kUnavailable);
+}
+
+TEST_F(Buffer, CloseEndsTheWaitsOfDraws) {
+  Make();
+  std::thread early(
+      [this] { EXPECT_EQ(Draw(1, 0, 0, true, kNever).code(), absl::StatusCode::kUnavailable); });
+  buffer_->Close();
+  early.join();
+  EXPECT_EQ(Draw(1, 0, 0, true, kNever).code(), absl::StatusCode::kUnavailable);
 }
 
 TEST_F(Buffer, RefusesSequencesAndEndsThatMakeNoSense) {
