@@ -5,6 +5,7 @@
 // own definitions come before a shared library's, so those below take the place of Abseil's, for us and for
 // gRPC. Slower, and readers exclude each other; the contracts are the same.
 #include <pthread.h>
+#include <sanitizer/tsan_interface.h>
 
 #include <atomic>
 #include <cerrno>
@@ -18,6 +19,21 @@
 
 // Named by the link options, so that a linker takes this file out of its archive.
 extern "C" const int dbr_tsan_mutex = 1;
+
+// What these libraries do with memory inside the functions that ThreadSanitizer intercepts (free, memcpy) is
+// theirs: they order it by atomics that it does not see either.
+extern "C" const char* __tsan_default_suppressions() {
+  return "called_from_lib:libgrpc.so\n"
+         "called_from_lib:libgrpc++.so\n"
+         "called_from_lib:libgrpc++_reflection.so\n"
+         "called_from_lib:libgpr.so\n"
+         "called_from_lib:libprotobuf.so\n"
+         "called_from_lib:libabsl_status.so\n"
+         "called_from_lib:libabsl_statusor.so\n"
+         "called_from_lib:libabsl_strings.so\n"
+         "called_from_lib:libabsl_cord.so\n"
+         "called_from_lib:libabsl_cord_internal.so\n";
+}
 
 namespace dbr {
 namespace {
@@ -61,9 +77,13 @@ Behind& Of(const void* object) {
   return *found;
 }
 
+// Every use of what stands behind ends with a release, and destroying it begins with an acquire: gRPC counts
+// references to the owners of its mutexes by atomics that ThreadSanitizer does not see.
 template <class Behind>
 void Destroy(const void* object) {
-  delete WordOf<Behind>(object).exchange(nullptr);
+  Behind* behind = WordOf<Behind>(object).exchange(nullptr);
+  if (behind != nullptr) __tsan_acquire(behind);
+  delete behind;
 }
 
 void WakeWaiters(Lock& lock) {
@@ -77,6 +97,7 @@ void LockIt(const absl::Mutex* mutex) {
 void UnlockIt(const absl::Mutex* mutex) {
   Lock& lock = Of<Lock>(mutex);
   WakeWaiters(lock);
+  __tsan_release(&lock);
   DBR_CHECK(pthread_mutex_unlock(&lock.mutex) == 0);
 }
 
@@ -104,7 +125,17 @@ bool AwaitIt(const absl::Mutex* mutex, const absl::Condition& condition, absl::T
 bool WaitForSignal(const absl::CondVar* cond_var, const absl::Mutex* mutex, absl::Time deadline) {
   Lock& lock = Of<Lock>(mutex);
   WakeWaiters(lock);
-  return !WaitOn(&Of<Signal>(cond_var).cond, &lock.mutex, deadline);
+  Signal& signal = Of<Signal>(cond_var);
+  const bool in_time = WaitOn(&signal.cond, &lock.mutex, deadline);
+  __tsan_release(&signal);
+  return !in_time;
+}
+
+// The signal behind a CondVar, by whose waking the other thread may destroy it.
+pthread_cond_t* LastUse(const absl::CondVar* cond_var) {
+  Signal& signal = Of<Signal>(cond_var);
+  __tsan_release(&signal);
+  return &signal.cond;
 }
 
 absl::Time After(absl::Duration timeout) {
@@ -187,10 +218,10 @@ bool CondVar::WaitWithDeadline(Mutex* mutex, Time deadline) {
   return dbr::WaitForSignal(this, mutex, deadline);
 }
 void CondVar::Signal() {
-  pthread_cond_signal(&dbr::Of<dbr::Signal>(this).cond);
+  pthread_cond_signal(dbr::LastUse(this));
 }
 void CondVar::SignalAll() {
-  pthread_cond_broadcast(&dbr::Of<dbr::Signal>(this).cond);
+  pthread_cond_broadcast(dbr::LastUse(this));
 }
 void CondVar::EnableDebugLog(const char*) {}
 
