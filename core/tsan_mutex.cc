@@ -28,6 +28,7 @@ extern "C" const char* __tsan_default_suppressions() {
          "called_from_lib:libgrpc++_reflection.so\n"
          "called_from_lib:libgpr.so\n"
          "called_from_lib:libprotobuf.so\n"
+         "called_from_lib:libabsl_time_zone.so\n"
          "called_from_lib:libabsl_status.so\n"
          "called_from_lib:libabsl_statusor.so\n"
          "called_from_lib:libabsl_strings.so\n"
