@@ -104,6 +104,9 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
   Trainer trainer(learner, std::move(parts));
   if (arguments.resume) RETURN_IF_ERROR(Resume(arguments.folder, learner, &trainer));
 
+  if (const auto newest = stats.Stats(kFirstStatsTimeout); newest.ok()) {
+    trainer.StartVersionsAfter(newest->newest_critic_version());
+  }
   ASSIGN_OR_RETURN(
       const RunningServer running,
       StartServer({arguments.address, arguments.allow_insecure || learner.allow_insecure()}, {&service}));

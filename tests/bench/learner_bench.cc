@@ -55,7 +55,9 @@ void LearnerUpdate(benchmark::State& state, const AlgorithmSpec& spec) {
       (*algorithm)->UpdateFlops() * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
   state.SetItemsProcessed(state.iterations());
 }
-BENCHMARK_CAPTURE(LearnerUpdate, dbr / connect4, Connect4Spec())->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(LearnerUpdate, dbr_connect4, Connect4Spec())
+    ->Name("LearnerUpdate/dbr/connect4")
+    ->Unit(benchmark::kMillisecond);
 
 // The limit: a product of two square matrices in single precision.
 void Sgemm(benchmark::State& state) {
