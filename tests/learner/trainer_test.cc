@@ -131,6 +131,16 @@ TEST_F(TrainerTest, ContinuesFromItsCheckpoint) {
   EXPECT_GT(policy_after->version, policy_before->version);
 }
 
+TEST_F(TrainerTest, VersionsGoOnAfterTheNewestThatTheReplayHasSeen) {
+  Insert(100);
+  const auto trainer = MakeTrainer(kUpdates);
+  trainer->StartVersionsAfter(1000);
+  RunToTheEnd(trainer.get());
+  const auto policy = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
+  ASSERT_TRUE(policy.ok()) << policy.status();
+  EXPECT_GT(policy->version, 1000u);
+}
+
 TEST_F(TrainerTest, StopsWhileTheRateLimiterHoldsTheFirstDraw) {
   Insert(10);  // below min_size
   const auto trainer = MakeTrainer(kUpdates);
