@@ -77,8 +77,9 @@ class TrainerTest : public testing::Test {
     return std::make_unique<Trainer>(config, std::move(parts));
   }
 
-  // Runs until the service says that training has finished, then stops.
+  // Runs until the service says that this run has finished, then stops.
   void RunToTheEnd(Trainer* trainer) {
+    service_.SetStatus(LearnerStatus());  // not the end of a run before
     std::thread thread([&] { EXPECT_TRUE(trainer->Run().ok()); });
     const absl::Time deadline = absl::Now() + absl::Seconds(60);
     LearnerStatus status;
