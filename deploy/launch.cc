@@ -54,11 +54,7 @@ absl::StatusOr<std::unique_ptr<Launch>> Launch::Create(RunPlan plan, std::string
 }
 
 Launch::Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_ptr<spdlog::logger> log)
-    : plan_(std::move(plan)),
-      programs_(std::move(programs)),
-      out_(out),
-      log_(std::move(log)),
-      line_(out, kLineEvery) {
+    : plan_(std::move(plan)), programs_(std::move(programs)), log_(std::move(log)), line_(out, kLineEvery) {
   if (plan_.resume) before_ = ReadSummary(plan_.folder);
   summary_ = before_;
   summary_.env = plan_.config.env().name();
@@ -76,7 +72,7 @@ absl::StatusOr<int> Launch::Run() {
   if (status.ok()) status = Train();
   line_.End();
   if (status.ok()) Say("stopping, and saving everything");
-  StopAll(/*ask=*/status.ok());
+  const bool saved = StopAll(/*ask=*/status.ok());
   if (!status.ok()) {
     summary_.ended = "failed";
     summary_.failure = std::string(status.message());
@@ -85,9 +81,11 @@ absl::StatusOr<int> Launch::Run() {
     return status;
   }
   SaveSummary();
-  Say(absl::StrCat("training ended (", Reason(summary_), "): ", WithCommas(summary_.games), " games, ",
-                   WithCommas(summary_.transitions), " transitions, ", WithCommas(summary_.updates),
-                   " updates in ", Clock(absl::Seconds(summary_.training_s)), "; all is saved"));
+  Say(absl::StrCat(
+      "training ended (", Reason(summary_), "): ", WithCommas(summary_.games), " games, ",
+      WithCommas(summary_.transitions), " transitions, ", WithCommas(summary_.updates), " updates in ",
+      Clock(absl::Seconds(summary_.training_s)),
+      saved ? "; all is saved" : absl::StrCat("; NOT all could be saved, see ", plan_.folder.log("launch"))));
   bool interrupted = summary_.ended == "interrupted";
   if (!interrupted) RETURN_IF_ERROR(FinalEvaluation(&interrupted));
   if (interrupted) {
@@ -209,15 +207,17 @@ std::optional<absl::Duration> Launch::TimeLeft() const {
   return left;
 }
 
-// Actors first; then what the services count is final and, where `ask` is set, noted; then the services.
-void Launch::StopAll(bool ask) {
-  if (supervisor_ == nullptr) return;
-  supervisor_->Stop(kStopActors);
+// Actors first; then what the services count is final and, where `ask` is set, noted; then the services. True
+// where every process ended by itself and without an error.
+bool Launch::StopAll(bool ask) {
+  if (supervisor_ == nullptr) return false;
+  bool clean = supervisor_->Stop(kStopActors);
   if (ask && monitor_ != nullptr) summary_.Update(monitor_->Ask(kLastAnswerWithin));
   monitor_.reset();
-  supervisor_->Stop();
+  clean = supervisor_->Stop() && clean;
   supervisor_.reset();
   summary_.wall_s = before_.wall_s + absl::ToDoubleSeconds(absl::Now() - started_);
+  return clean;
 }
 
 absl::Status Launch::FinalEvaluation(bool* interrupted) {

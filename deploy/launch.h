@@ -40,14 +40,13 @@ class Launch {
   void Observe(absl::Time now);
   bool LimitReached() const;
   std::optional<absl::Duration> TimeLeft() const;
-  void StopAll(bool ask);
+  bool StopAll(bool ask);
   absl::Status FinalEvaluation(bool* interrupted);
   void Say(const std::string& text);
   void SaveSummary();
 
   const RunPlan plan_;
   const std::string programs_;
-  std::FILE* const out_;
   const std::shared_ptr<spdlog::logger> log_;
   ProgressLine line_;
   RunSummary before_;  // of the launches that this one continues

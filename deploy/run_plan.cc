@@ -15,6 +15,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
 #include "core/status_macros.h"
+#include "deploy/results.h"
 #include "proto/config_file.h"
 
 namespace dbr {
@@ -134,6 +135,8 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
       configured > 0 ? configured : DefaultActors(static_cast<int>(std::thread::hardware_concurrency()));
   RETURN_IF_ERROR(MakeFolder(plan.folder));
   ASSIGN_OR_RETURN(plan.lock, RunFolderLock::Take(plan.folder));
+  std::error_code none_there;
+  std::filesystem::remove(ResultsPath(plan.folder), none_there);  // of the launch that this one continues
   RETURN_IF_ERROR(WriteFileAtomically(plan.folder.config(), PrintConfig(plan.config)));
   return plan;
 }
@@ -155,6 +158,7 @@ std::vector<ProcessSpec> Processes(const RunPlan& plan, const std::string& progr
       spec("replay", "dbr-replay", {"--address", plan.replay_address}, kStopReplay),
       spec("learner", "dbr-learner", {"--replay", plan.replay_address, "--address", plan.learner_address},
            kStopLearner)};
+  all[0].stop_grace = absl::Minutes(2);  // it brings the whole store to disk
   const bool insecure[] = {plan.config.replay().allow_insecure(), plan.config.learner().allow_insecure()};
   for (int i = 0; i < 2; ++i) {
     if (insecure[i]) all[i].command.push_back("--allow-insecure");

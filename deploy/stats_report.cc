@@ -155,6 +155,31 @@ Json SourcesJson(const StatsReply& stats) {
           {"seed", source(stats.seed(), stats.seed_plus(), stats.seed_minus())}};
 }
 
+Json EdgesJson(const StatsReply& stats) {
+  Json list = Json::array();
+  for (const double edge : stats.advantage_edges()) list.push_back(Number(edge));
+  return list;
+}
+
+Json BlockedJson(const StatsReply& stats) {
+  Json list = Json::array();
+  for (const BlockedClients& blocked : stats.blocked()) {
+    list.push_back({{"call", blocked.call()}, {"clients", blocked.clients()}, {"why", blocked.why()}});
+  }
+  return list;
+}
+
+Json LatenciesJson(const StatsReply& stats) {
+  Json list = Json::array();
+  for (const LatencyStats& call : stats.latencies()) {
+    list.push_back({{"call", call.call()},
+                    {"count", call.count()},
+                    {"p50_us", Number(call.p50_us())},
+                    {"p99_us", Number(call.p99_us())}});
+  }
+  return list;
+}
+
 }  // namespace
 
 std::string StatsText(const std::string& address, const StatsReply& stats) {
@@ -191,24 +216,12 @@ Json ToJson(const StatsReply& stats) {
                {"recent_score_mean", Number(stats.recent_score_mean())},
                {"recent_length_mean", Number(stats.recent_length_mean())},
                {"uptime_s", Number(stats.uptime_s())}};
-  json["advantage_edges"] = Json::array();
-  for (const double edge : stats.advantage_edges()) json["advantage_edges"].push_back(Number(edge));
-  json["advantage_histogram"] = Json::array();
-  for (const std::uint64_t count : stats.advantage_histogram()) json["advantage_histogram"].push_back(count);
+  json["advantage_edges"] = EdgesJson(stats);
+  json["advantage_histogram"] = stats.advantage_histogram();
   json["sources"] = SourcesJson(stats);
   json["writers"] = WritersJson(stats);
-  json["blocked"] = Json::array();
-  for (const BlockedClients& blocked : stats.blocked()) {
-    json["blocked"].push_back(
-        {{"call", blocked.call()}, {"clients", blocked.clients()}, {"why", blocked.why()}});
-  }
-  json["latencies"] = Json::array();
-  for (const LatencyStats& call : stats.latencies()) {
-    json["latencies"].push_back({{"call", call.call()},
-                                 {"count", call.count()},
-                                 {"p50_us", Number(call.p50_us())},
-                                 {"p99_us", Number(call.p99_us())}});
-  }
+  json["blocked"] = BlockedJson(stats);
+  json["latencies"] = LatenciesJson(stats);
   return json;
 }
 

@@ -28,15 +28,15 @@ struct ProcessSpec {
   std::vector<std::string> restart_arguments;  // added when it is started again, for example --resume
   std::string log;                             // takes stdout and stderr, appended
   int stop_rank = 0;                           // lower ranks are stopped, and waited for, before higher ones
-  absl::Duration stop_grace = absl::Seconds(20);  // from SIGTERM to SIGKILL
+  absl::Duration stop_grace = absl::Seconds(30);  // from SIGTERM to SIGKILL
 };
 
 struct SupervisorOptions {
   std::uint32_t max_restarts = 5;  // of one process within restart_window
   absl::Duration restart_window = absl::Minutes(5);
   absl::Duration first_restart_delay =
-      absl::Milliseconds(200);                      // doubles with each restart within the window
-  absl::Duration orphan_grace = absl::Seconds(20);  // what children have to end when this process is killed
+      absl::Milliseconds(200);                     // doubles with each restart within the window
+  absl::Duration orphan_grace = absl::Minutes(1);  // what children have to end when this process is killed
   // Called with one line at each start, death, restart and kill, from Start, Wait and Stop; `notable` where
   // that was not asked for.
   std::function<void(const std::string& event, bool notable)> on_event = [](const std::string&, bool) {};

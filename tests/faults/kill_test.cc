@@ -60,7 +60,7 @@ void ExpectNothingLost(const Json& stats) {
 
 TEST_F(KillTest, ARunSurvivesTheDeathOfEachProcess) {
   DbrProcess launch("dbr",
-                    {"launch", SmallConfig(), "--run-dir", run_.root, "--set", "learner.max_updates=20000"});
+                    {"launch", SmallConfig(), "--run-dir", run_.root, "--set", "learner.max_updates=8000"});
   ASSERT_TRUE(launch.Await([&] { return Counter(run_, "relabelled") > 0; })) << launch.output();
 
   Json before = Stats(run_);
@@ -93,10 +93,11 @@ TEST_F(KillTest, ARunSurvivesTheDeathOfEachProcess) {
   })) << launch.output();
   EXPECT_GE(Stats(run_)["total"], before["total"]);
 
-  EXPECT_EQ(launch.Wait(), 0) << launch.output();
+  ASSERT_EQ(launch.Wait(), 0) << launch.output();
   const Json summary = Summary(run_);
   EXPECT_EQ(summary["ended"], "max_updates") << launch.output();
   EXPECT_EQ(summary["restarts"], 3);
+  ASSERT_THAT(summary["final"], SizeIs(1));
   EXPECT_GT(summary["final"][0]["score"]["mean"], 0.75);
   const std::string log = Contents(run_.log("launch"));
   for (const char* name : {"actor-0", "learner", "replay"}) {

