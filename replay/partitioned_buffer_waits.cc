@@ -79,11 +79,13 @@ absl::Status PartitionedBuffer::AwaitDraw(const DrawRequest& request, absl::Time
 }
 
 void PartitionedBuffer::AddBlocked(BufferStats* stats) const {
-  if (waiting_.inserts > 0) {
+  // A call that may go on, and only has not run yet, is not blocked.
+  if (waiting_.inserts > 0 && !CanInsert()) {
     stats->blocked.push_back({"insert", waiting_.inserts, limiter_.WhyInsertWaits(Counts())});
   }
-  if (waiting_.draws > 0)
+  if (waiting_.draws > 0 && !CanDraw(waiting_.newest_draw)) {
     stats->blocked.push_back({"sample", waiting_.draws, WhyDrawWaits(waiting_.newest_draw)});
+  }
 }
 
 }  // namespace dbr
