@@ -110,7 +110,9 @@ void Supervisor::Poll(absl::Time deadline) {
   [[maybe_unused]] const ssize_t n = read(wake_fd_, &wakes, sizeof wakes);
   signalfd_siginfo info;
   while (read(signal_fd_, &info, sizeof info) == sizeof info) {
-    if (info.ssi_signo != SIGCHLD) ++stop_signals_;
+    // A terminal that goes away asks to stop, but is not impatient.
+    const bool hangup_again = info.ssi_signo == SIGHUP && stop_signals_ > 0;
+    if (info.ssi_signo != SIGCHLD && !hangup_again) ++stop_signals_;
   }
 }
 

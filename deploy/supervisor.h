@@ -68,7 +68,7 @@ class Supervisor {
   // Ends the Wait under way, or the next one. Thread-safe.
   void Wake();
 
-  // SIGINT, SIGTERM and SIGHUP so far.
+  // SIGINT, SIGTERM and SIGHUP so far; a SIGHUP after another signal does not count.
   int stop_signals() const { return stop_signals_; }
   std::uint64_t restarts() const { return restarts_; }
   // 0 where there is none of that name or it does not run now.

@@ -221,11 +221,14 @@ TEST_F(SupervisorTest, AnotherSignalKillsTheChildThatIsWaitedFor) {
 TEST_F(SupervisorTest, CountsStopSignalsAndReturnsAtOnce) {
   const auto supervisor = Make();
   int expected = 0;
-  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+  for (const int number : {SIGHUP, SIGINT, SIGTERM}) {
     kill(getpid(), number);
     EXPECT_TRUE(supervisor->Wait(absl::InfiniteFuture()).ok());
     EXPECT_EQ(supervisor->stop_signals(), ++expected);
   }
+  kill(getpid(), SIGHUP);  // the terminal went away while we stop: no reason to kill anything
+  EXPECT_TRUE(supervisor->Wait(absl::InfiniteFuture()).ok());
+  EXPECT_EQ(supervisor->stop_signals(), expected);
 }
 
 TEST_F(SupervisorTest, WakeEndsAWait) {
