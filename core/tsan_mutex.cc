@@ -34,8 +34,8 @@ extern "C" const char* __tsan_default_suppressions() {
          "called_from_lib:libabsl_strings.so\n"
          "called_from_lib:libabsl_cord.so\n"
          "called_from_lib:libabsl_cord_internal.so\n"
-         // The last owner of gRPC's pool of threads frees its condition variables; a shared_ptr's count in the
-         // uninstrumented library is what orders that.
+         // The last owner of gRPC's pool of threads frees its condition variables; a shared_ptr's count in
+         // the uninstrumented library is what orders that.
          "race:grpc_event_engine::experimental::ThreadPool::State\n";
 }
 

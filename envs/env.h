@@ -13,7 +13,8 @@
 
 namespace dbr {
 
-// What a step gave. `terminated`: the task ended, no future value. `truncated`: cut at the time limit, the future has value.
+// What a step gave. `terminated`: the task ended, no future value. `truncated`: cut at the time limit, the
+// future has value.
 struct StepResult {
   float reward = 0;
   bool terminated = false;
@@ -34,26 +35,29 @@ class Env {
   // [spec().actions.mask_width()] into the caller's memory.
   virtual void Reset(std::uint64_t seed, absl::Span<float> observation, absl::Span<float> mask) = 0;
 
-  // Takes an action [spec().actions.width()], legal under the last mask (CHECKed), and writes the next observation and
-  // mask. After an end the observation is the final one and its mask may be all zeros; Reset comes next.
-  virtual StepResult Step(absl::Span<const float> action, absl::Span<float> observation, absl::Span<float> mask) = 0;
+  // Takes an action [spec().actions.width()], legal under the last mask (CHECKed), and writes the next
+  // observation and mask. After an end the observation is the final one and its mask may be all zeros; Reset
+  // comes next.
+  virtual StepResult Step(absl::Span<const float> action, absl::Span<float> observation,
+                          absl::Span<float> mask) = 0;
 };
 
 // What an environment is made with.
 struct EnvOptions {
   std::string name;
-  std::vector<std::string> opponents;  // each episode draws one; empty: the environment's default. Only two-player games
+  // Each episode draws one; empty: the environment's default. Only two-player games have opponents.
+  std::vector<std::string> opponents;
 };
 
-// Makes an environment by its name or alias. InvalidArgument, naming the known names, for an unknown environment or
-// opponent, and for opponents given to an environment that has none.
+// Makes an environment by its name or alias. InvalidArgument, naming the known names, for an unknown
+// environment or opponent, and for opponents given to an environment that has none.
 absl::StatusOr<std::unique_ptr<Env>> MakeEnv(const EnvOptions& options);
 
 // All names, sorted; the conformance suite walks them.
 std::vector<std::string> EnvNames();
 
-// Opponents against which an environment is evaluated by default, for example random, one_ply, mcts:10, mcts:100; empty
-// where it has none.
+// Opponents against which an environment is evaluated by default, for example random, one_ply, mcts:10,
+// mcts:100; empty where it has none.
 std::vector<std::string> EvaluationOpponents(absl::string_view env_name);
 
 }  // namespace dbr

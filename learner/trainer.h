@@ -37,8 +37,9 @@ class Trainer {
   // Continues from a checkpoint that Save() made.
   absl::Status Load(const TensorFile& file);
 
-  // Versions will be greater than `version`: labels of a learner that went on after its last checkpoint, and was then
-  // killed, carry versions that this one would use again, and the replay refuses what is older than a label it has.
+  // Versions will be greater than `version`: labels of a learner that went on after its last checkpoint, and
+  // was then killed, carry versions that this one would use again, and the replay refuses what is older than
+  // a label it has.
   void StartVersionsAfter(std::uint64_t version) { snapshot_.version = std::max(snapshot_.version, version); }
 
   // Publishes the first policy, then updates until stopped, an error, or max_updates; saves at the end. After

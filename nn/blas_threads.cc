@@ -9,7 +9,9 @@ extern "C" void openblas_set_num_threads(int threads);
 
 namespace dbr {
 
-void UseOneBlasThread() { openblas_set_num_threads(1); }
+void UseOneBlasThread() {
+  openblas_set_num_threads(1);
+}
 
 void RestartWithOneBlasThread(char** argv) {
   constexpr char kVariable[] = "OPENBLAS_NUM_THREADS";

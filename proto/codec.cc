@@ -139,7 +139,8 @@ namespace {
 absl::Status CheckSize(const char* name, std::uint32_t found) {
   constexpr std::uint32_t kMostUnits = 1u << 20;
   if (found >= 1 && found <= kMostUnits) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("policy: ", name, ": expected 1 to ", kMostUnits, ", found ", found));
+  return absl::InvalidArgumentError(
+      absl::StrCat("policy: ", name, ": expected 1 to ", kMostUnits, ", found ", found));
 }
 
 }  // namespace

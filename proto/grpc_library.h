@@ -5,8 +5,8 @@
 
 namespace dbr {
 
-// Keeps the library initialized until the process ends. Without it the end of the last channel or server shuts the
-// library down, and that joins a thread of its own which may sit in a poll of ten seconds.
+// Keeps the library initialized until the process ends. Without it the end of the last channel or server
+// shuts the library down, and that joins a thread of its own which may sit in a poll of ten seconds.
 inline void KeepGrpcInitialized() {
   [[maybe_unused]] static const bool kept = (grpc_init(), true);
 }
