@@ -23,7 +23,7 @@ StepLoop::StepLoop(std::unique_ptr<VectorEnv> envs, const StepLoopOptions& optio
 absl::Status StepLoop::Step(const PolicyNetworks& policy) {
   RETURN_IF_ERROR(runner_.Act(policy, options_.mode, envs_->observations(), envs_->masks(), rng_, actions_));
   counters_.explored += exploration_.Apply(envs_->masks(), rng_, &actions_);
-  runner_.Advantages(actions_, advantages_);
+  runner_.Advantages(actions_, rng_, advantages_);
   for (int i = 0; i < envs_->size(); ++i) {
     envs_->Step(i, actions_);
     RETURN_IF_ERROR(Emit(i, policy.snapshot().version));

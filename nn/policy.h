@@ -1,37 +1,19 @@
-// A policy ready to act: networks rebuilt from a snapshot, evaluated for many environments at once.
+// Acting by a policy's networks, for many environments at once.
 #pragma once
 
-#include <Eigen/Core>
 #include <memory>
-#include <optional>
 
-#include "absl/status/statusor.h"
+#include "absl/status/status.h"
 #include "core/batch.h"
-#include "core/policy_snapshot.h"
 #include "core/rng.h"
+#include "nn/policy_networks.h"
 #include "proto/config.pb.h"
 
 namespace dbr {
 
-// Immutable; shared by pointer between threads. Holds the snapshot that it was made from.
-class PolicyNetworks {
- public:
-  // InvalidArgument where a network is missing or its parameters are not as many as the spec asks; names the
-  // network.
-  static absl::StatusOr<std::shared_ptr<const PolicyNetworks>> Create(PolicySnapshot snapshot);
-
-  const PolicySnapshot& snapshot() const { return snapshot_; }
-  const PolicySpec& spec() const { return snapshot_.spec; }
-  bool has_critics() const;
-  bool has_behavior() const;  // beta+ and beta-
-
- private:
-  explicit PolicyNetworks(PolicySnapshot snapshot) : snapshot_(std::move(snapshot)) {}
-  PolicySnapshot snapshot_;
-};
-
-// Everything that the networks say of n observations; [actions x n] each, empty where the snapshot lacks the
-// network. Probabilities of illegal actions are 0; Q of illegal actions is meaningless.
+// Everything that the networks of a policy over discrete actions say of n observations; [actions x n] each,
+// empty where the snapshot lacks the network. Probabilities of illegal actions are 0; Q of illegal actions is
+// meaningless.
 struct PolicyView {
   MatrixX<float> policy;
   MatrixX<float> beta_plus;
@@ -45,22 +27,23 @@ class PolicyRunner {
   PolicyRunner();
   ~PolicyRunner();
 
-  // Chooses an action for each of n columns: observations [observation x n], masks [actions x n], actions
-  // [width x n]. InvalidArgument where `mode` needs networks that the snapshot lacks. A NaN Q or probability
-  // gives Internal.
-  absl::Status Act(const PolicyNetworks& policy, ActingMode mode,
-                   const Eigen::Ref<const MatrixX<float>>& observations,
-                   const Eigen::Ref<const MatrixX<float>>& masks, Rng& rng,
-                   Eigen::Ref<MatrixX<float>> actions);
+  // Chooses an action for each of n columns: observations [observation x n], masks [mask width x n], actions
+  // [width x n]. InvalidArgument where `mode` needs networks that the snapshot lacks, or another action
+  // space. A NaN Q or probability gives Internal.
+  absl::Status Act(const PolicyNetworks& policy, ActingMode mode, const ConstMatrixRef<float>& observations,
+                   const ConstMatrixRef<float>& masks, Rng& rng, Eigen::Ref<MatrixX<float>> actions);
 
-  // After Act: A = Q(s, a) - V(s) of given actions (ALGORITHMS: DBR, step 6), Q the smaller twin, V its mean
-  // under pi. [n]; the actions may be others than Act's (exploration). NaN (not yet judged) where the
-  // snapshot has no critics.
-  void Advantages(const Eigen::Ref<const MatrixX<float>>& actions, Eigen::Ref<VectorX<float>> advantages);
+  // After Act, for the same policy: A = Q(s, a) - V(s) of given actions (docs/algorithms.md, DBR step 6), Q
+  // the smaller twin, V its mean under pi (continuous: over kValueSamples draws from `rng`). [n]; the actions
+  // may be others than Act's (exploration). NaN (not yet judged) where the snapshot has no critics.
+  void Advantages(const ConstMatrixRef<float>& actions, Rng& rng, Eigen::Ref<VectorX<float>> advantages);
 
-  // All of the networks' outputs, for probing.
-  const PolicyView& View(const PolicyNetworks& policy, const Eigen::Ref<const MatrixX<float>>& observations,
-                         const Eigen::Ref<const MatrixX<float>>& masks);
+  // All of the networks' outputs, for probing; discrete actions alone.
+  const PolicyView& View(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
+                         const ConstMatrixRef<float>& masks);
+
+  static constexpr int kGreedySamples = 10;  // of GREEDY_Q over continuous actions
+  static constexpr int kValueSamples = 5;
 
  private:
   struct State;

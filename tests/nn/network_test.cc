@@ -254,7 +254,7 @@ TEST_F(Acting, AdvantageIsTheSmallerTwinLessItsMeanUnderThePolicy) {
   MatrixX<float> action(1, 1);
   action << 2;
   VectorX<float> advantage(1);
-  runner_.Advantages(action, advantage);
+  runner_.Advantages(action, rng_, advantage);
   EXPECT_NEAR(advantage[0], 0.5 - (0.4 * 0.1 + 0.3 * 0.2 + 0.2 * 0.5 + 0.1 * 0.8), 1e-6);
 }
 
@@ -265,7 +265,7 @@ TEST_F(Acting, AMissingNetworkIsNamed) {
   Act(SAMPLE, {1, 1, 1, 1});
   EXPECT_TRUE(status_.ok());
   VectorX<float> advantage(1);
-  runner_.Advantages(MatrixX<float>::Zero(1, 1), advantage);
+  runner_.Advantages(MatrixX<float>::Zero(1, 1), rng_, advantage);
   EXPECT_TRUE(std::isnan(advantage[0]));
 }
 

@@ -1,0 +1,93 @@
+#include "nn/continuous_actor.h"
+
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "core/check.h"
+
+namespace dbr {
+
+absl::Status ContinuousActor::Act(const PolicyNetworks& policy, ActingMode mode,
+                                  const ConstMatrixRef<float>& observations, Rng& rng,
+                                  Eigen::Ref<MatrixX<float>> actions) {
+  if (mode == SUPPORT) {
+    return absl::InvalidArgumentError(
+        "the mode SUPPORT serves discrete actions alone: use SAMPLE, MODE or "
+        "GREEDY_Q");
+  }
+  head_.Split(MlpForward<float>(policy.policy_shape(), policy.snapshot().Find(kPolicyNetwork)->data(), observations,
+                         &policy_activations_),
+              kPolicyLogStd);
+  if (!head_.mean().allFinite() || !head_.log_std().allFinite()) {
+    return absl::InternalError(absl::StrCat("policy version ", policy.snapshot().version,
+                                            " gives values that are not finite. Use an earlier checkpoint."));
+  }
+  if (mode == MODE) {
+    actions = head_.mean().array().tanh().matrix();
+  } else if (mode == SAMPLE) {
+    Sample(1, rng);
+    actions = actions_;
+  } else {
+    ChooseGreedy(policy, observations, rng, actions);
+  }
+  return absl::OkStatus();
+}
+
+void ContinuousActor::Sample(Eigen::Index count, Rng& rng) {
+  const MatrixX<float>& mean = head_.mean();
+  actions_.resize(mean.rows(), count * mean.cols());
+  for (Eigen::Index j = 0; j < actions_.cols(); ++j) {
+    const Eigen::Index state = j % mean.cols();
+    for (Eigen::Index d = 0; d < mean.rows(); ++d) {
+      const float noise = static_cast<float>(rng.Normal());
+      actions_(d, j) = std::tanh(mean(d, state) + std::exp(head_.log_std()(d, state)) * noise);
+    }
+  }
+}
+
+const MatrixX<float>& ContinuousActor::Critic(const PolicyNetworks& policy, const char* name,
+                                              const ConstMatrixRef<float>& observations,
+                                              const ConstMatrixRef<float>& actions) {
+  const Eigen::Index n = observations.cols();
+  inputs_.resize(observations.rows() + actions.rows(), actions.cols());
+  for (Eigen::Index first = 0; first < actions.cols(); first += n) {
+    inputs_.block(0, first, observations.rows(), n) = observations;
+  }
+  inputs_.bottomRows(actions.rows()) = actions;
+  const std::vector<float>* parameters = policy.snapshot().Find(name);
+  DBR_CHECK(parameters != nullptr);
+  return MlpForward<float>(policy.critic_shape(), parameters->data(), inputs_, &critic_activations_);
+}
+
+void ContinuousActor::ChooseGreedy(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
+                                   Rng& rng, Eigen::Ref<MatrixX<float>> actions) {
+  Sample(PolicyRunner::kGreedySamples, rng);
+  const MatrixX<float>& q = Critic(policy, kCritic1, observations, actions_);
+  const Eigen::Index n = observations.cols();
+  for (Eigen::Index j = 0; j < n; ++j) {
+    Eigen::Index best = j;
+    for (Eigen::Index k = j; k < q.cols(); k += n) {
+      if (q(0, k) > q(0, best)) best = k;
+    }
+    actions.col(j) = actions_.col(best);
+  }
+}
+
+void ContinuousActor::Advantages(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
+                                 const ConstMatrixRef<float>& actions, Rng& rng,
+                                 Eigen::Ref<VectorX<float>> advantages) {
+  const auto smaller = [&](const ConstMatrixRef<float>& at) {
+    values_ = Critic(policy, kCritic1, observations, at).row(0);
+    values_ = values_.cwiseMin(Critic(policy, kCritic2, observations, at).row(0).transpose());
+  };
+  smaller(actions);
+  advantages = values_;
+  Sample(PolicyRunner::kValueSamples, rng);
+  smaller(actions_);
+  const Eigen::Index n = observations.cols();
+  for (Eigen::Index k = 0; k < PolicyRunner::kValueSamples; ++k) {
+    advantages -= values_.segment(k * n, n) / static_cast<float>(PolicyRunner::kValueSamples);
+  }
+}
+
+}  // namespace dbr

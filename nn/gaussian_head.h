@@ -1,0 +1,47 @@
+// The output layer of a Gaussian network: its upper half the means, its lower half the log-stds, clipped.
+#pragma once
+
+#include "nn/gaussian.h"
+
+namespace dbr {
+
+// Limits of the log-std (docs/algorithms.md, "Common to all").
+struct LogStdLimits {
+  double min = -20;
+  double max = 2;
+};
+inline constexpr LogStdLimits kPolicyLogStd{-20, 2};
+inline constexpr LogStdLimits kBehaviorLogStd{-5, 2};
+
+// Plain value, reused from batch to batch.
+template <class Scalar>
+class GaussianHead {
+ public:
+  // Takes the output [2 * dimensions x n] of a network apart.
+  void Split(const ConstMatrixRef<Scalar>& output, const LogStdLimits& limits) {
+    const Eigen::Index dimensions = output.rows() / 2;
+    const auto min = static_cast<Scalar>(limits.min), max = static_cast<Scalar>(limits.max);
+    mean_ = output.topRows(dimensions);
+    log_std_ = output.bottomRows(dimensions).cwiseMax(min).cwiseMin(max);
+    within_ = (output.bottomRows(dimensions).array() >= min && output.bottomRows(dimensions).array() <= max)
+                  .template cast<Scalar>();
+  }
+
+  GaussianView<Scalar> view() const { return {mean_, log_std_}; }
+  const MatrixX<Scalar>& mean() const { return mean_; }
+  const MatrixX<Scalar>& log_std() const { return log_std_; }
+
+  // The gradient with respect to the output [2 * dimensions x n]; 0 for a log-std that was clipped.
+  void Join(const GaussianGradient<Scalar>& gradient, MatrixX<Scalar>* d_output) const {
+    d_output->resize(2 * mean_.rows(), mean_.cols());
+    d_output->topRows(mean_.rows()) = gradient.mean;
+    d_output->bottomRows(mean_.rows()) = gradient.log_std.cwiseProduct(within_);
+  }
+
+ private:
+  MatrixX<Scalar> mean_;     // [dimensions x n]
+  MatrixX<Scalar> log_std_;  // [dimensions x n]
+  MatrixX<Scalar> within_;   // [dimensions x n] 1 where the log-std was not clipped, else 0
+};
+
+}  // namespace dbr

@@ -1,0 +1,74 @@
+#include "nn/policy_networks.h"
+
+#include "absl/strings/str_cat.h"
+
+namespace dbr {
+namespace {
+
+absl::Status CheckSpec(const PolicySpec& spec) {
+  if (spec.observation_size <= 0 || spec.actions.size <= 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("expected sizes above 0, found observation_size ", spec.observation_size, " and ",
+                     spec.actions.size, spec.actions.discrete() ? " actions" : " action dimensions"));
+  }
+  for (const int size : spec.hidden_sizes) {
+    if (size <= 0)
+      return absl::InvalidArgumentError(absl::StrCat("hidden_sizes: expected above 0, found ", size));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+MlpShape PolicyShape(const PolicySpec& spec) {
+  const int outputs = spec.actions.discrete() ? spec.actions.size : 2 * spec.actions.size;
+  return MlpShape(spec.observation_size, spec.hidden_sizes, outputs);
+}
+
+MlpShape CriticShape(const PolicySpec& spec) {
+  if (spec.actions.discrete()) return PolicyShape(spec);
+  return MlpShape(spec.observation_size + spec.actions.size, spec.hidden_sizes, 1);
+}
+
+absl::StatusOr<std::shared_ptr<const PolicyNetworks>> PolicyNetworks::Create(PolicySnapshot snapshot) {
+  if (absl::Status status = CheckSpec(snapshot.spec); !status.ok()) return status;
+  if (snapshot.Find(kPolicyNetwork) == nullptr) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("network '", kPolicyNetwork, "' is missing from the policy"));
+  }
+  const std::shared_ptr<const PolicyNetworks> policy(new PolicyNetworks(std::move(snapshot)));
+  for (const auto& [name, parameters] : policy->snapshot_.networks) {
+    Eigen::Index expected = policy->policy_shape_.parameter_count();
+    if (name == kCritic1 || name == kCritic2) expected = policy->critic_shape_.parameter_count();
+    if (name == kObservationNormalizer) expected = 2 * policy->spec().observation_size;
+    if (parameters.size() == static_cast<std::size_t>(expected)) continue;
+    return absl::InvalidArgumentError(absl::StrCat("network '", name, "': expected ", expected,
+                                                   " parameters for its sizes, found ", parameters.size()));
+  }
+  return policy;
+}
+
+PolicyNetworks::PolicyNetworks(PolicySnapshot snapshot)
+    : snapshot_(std::move(snapshot)),
+      policy_shape_(PolicyShape(snapshot_.spec)),
+      critic_shape_(CriticShape(snapshot_.spec)) {}
+
+bool PolicyNetworks::has_critics() const {
+  return snapshot_.Find(kCritic1) != nullptr && snapshot_.Find(kCritic2) != nullptr;
+}
+
+bool PolicyNetworks::has_behavior() const {
+  return snapshot_.Find(kBetaPlus) != nullptr && snapshot_.Find(kBetaMinus) != nullptr;
+}
+
+bool PolicyNetworks::Normalize(const ConstMatrixRef<float>& observations, MatrixX<float>* normalized) const {
+  const std::vector<float>* statistics = snapshot_.Find(kObservationNormalizer);
+  if (statistics == nullptr) return false;
+  const Eigen::Index size = spec().observation_size;
+  const Eigen::Map<const VectorX<float>> mean(statistics->data(), size),
+      scale(statistics->data() + size, size);
+  *normalized = ((observations.colwise() - mean).array().colwise() * scale.array()).matrix();
+  return true;
+}
+
+}  // namespace dbr

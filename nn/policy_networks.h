@@ -1,0 +1,44 @@
+// The networks of a policy: which there are, of which sizes, and what they are fed.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "core/batch.h"
+#include "core/policy_snapshot.h"
+#include "nn/mlp.h"
+
+namespace dbr {
+
+// Over discrete actions every network maps an observation to a value for each action. Over continuous ones
+// the policy and the behaviour policies map it to means and log-stds [2 * dimensions], a critic maps
+// [observation; action] to one value.
+MlpShape PolicyShape(const PolicySpec& spec);
+MlpShape CriticShape(const PolicySpec& spec);
+
+// Immutable; shared by pointer between threads. Holds the snapshot that it was made from.
+class PolicyNetworks {
+ public:
+  // InvalidArgument where a network is missing or its parameters are not as many as the spec asks; names the
+  // network.
+  static absl::StatusOr<std::shared_ptr<const PolicyNetworks>> Create(PolicySnapshot snapshot);
+
+  const PolicySnapshot& snapshot() const { return snapshot_; }
+  const PolicySpec& spec() const { return snapshot_.spec; }
+  const MlpShape& policy_shape() const { return policy_shape_; }
+  const MlpShape& critic_shape() const { return critic_shape_; }
+  bool has_critics() const;
+  bool has_behavior() const;  // beta+ and beta-
+
+  // (observation - mean) / deviation [observation x n] where the policy was trained on that, else false.
+  bool Normalize(const ConstMatrixRef<float>& observations, MatrixX<float>* normalized) const;
+
+ private:
+  explicit PolicyNetworks(PolicySnapshot snapshot);
+
+  PolicySnapshot snapshot_;
+  MlpShape policy_shape_, critic_shape_;
+};
+
+}  // namespace dbr
