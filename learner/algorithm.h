@@ -81,8 +81,14 @@ class Algorithm {
 // Makes the algorithm that spec.config names. InvalidArgument where it does not serve the action space.
 absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& spec);
 
-// Name of the algorithm that a config sets ("dbr"), and all names, sorted; the conformance suite walks them.
+// Name of the algorithm that a config sets ("dbr").
 std::string AlgorithmName(const AlgorithmConfig& config);
-std::vector<std::string> AlgorithmNames();
+
+// All algorithms, once for each kind of action that they serve; the conformance suite walks them.
+struct AlgorithmId {
+  std::string name;
+  ActionKind actions;
+};
+std::vector<AlgorithmId> Algorithms();
 
 }  // namespace dbr

@@ -2,40 +2,20 @@
 
 #include <cmath>
 
-#include "absl/strings/str_cat.h"
+#include "learner/algorithms/algorithm_adapter.h"
 #include "learner/parts/learning_rate.h"
+#include "learner/parts/policy_export.h"
+#include "learner/parts/update_metrics.h"
 
 namespace dbr {
-namespace {
-
-BatchNeeds NeedsOf(const AlgorithmConfig& config) {
-  const int batch = static_cast<int>(config.batch_size());
-  const int behavior =
-      config.dbr().behavior_batch_size() > 0 ? static_cast<int>(config.dbr().behavior_batch_size()) : batch;
-  return {.uniform = batch, .plus = behavior, .minus = behavior};
-}
-
-PolicyLossOptions OptionsOf(const DbrConfig& config) {
-  return {.constraint = config.constraint(),
-          .divergence = config.divergence(),
-          .epsilon = config.epsilon(),
-          .mmd_sigma = config.mmd_sigma(),
-          .repel_negative = config.repel_negative(),
-          .normalize_q = config.normalize_q(),
-          .entropy_weight = config.entropy_weight(),
-          .use_q = config.warm_start_updates() == 0};
-}
-
-}  // namespace
-
 template <class Scalar>
 DiscreteDbr<Scalar>::DiscreteDbr(const AlgorithmSpec& spec)
     : spec_(spec),
-      needs_(NeedsOf(spec.config)),
-      options_(OptionsOf(spec.config.dbr())),
+      needs_(DualBehaviorNeeds(spec.config)),
+      options_(PolicyLossOptions::Of(spec.config.dbr())),
       init_rng_(spec.seed),
       shape_(spec.observation_size, spec.hidden_sizes, spec.actions.size),
-      runner_(static_cast<int>(spec.config.threads())),
+      runner_(UpdateThreads(spec.config)),
       policy_(shape_, spec.config.learning_rate(), /*with_target=*/true, init_rng_),
       critics_(shape_, spec.config.learning_rate(), init_rng_, &runner_),
       beta_plus_{
@@ -59,14 +39,17 @@ absl::Status DiscreteDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, cons
   SetLearningRate(LearningRate(spec_.config, updates_));
   runner_.Run([&] { FitBehavior(plus, &beta_plus_); }, [&] { FitBehavior(minus, &beta_minus_); });
   ComputeTargets(uniform);
-  const Scalar critic_loss = critics_.Fit(uniform.observations, uniform.actions, target_);
+  const Scalar critic_loss =
+      critics_.Fit(uniform.observations, [&](const MatrixX<Scalar>& q, MatrixX<Scalar>* d_q) {
+        return CriticLoss<Scalar>(q, uniform.actions, target_, d_q);
+      });
   const PolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
   ComputeAdvantages(uniform);
   multiplier_.Step(policy_loss.divergence_plus - policy_loss.threshold);
   critics_.UpdateTargets(spec_.config.target_tau());
   policy_.UpdateTarget(spec_.config.target_tau());
   ++updates_;
-  return Report(critic_loss, policy_loss, uniform);
+  return Report(critic_loss, policy_loss);
 }
 
 template <class Scalar>
@@ -95,7 +78,8 @@ template <class Scalar>
 void DiscreteDbr<Scalar>::ComputeTargets(const BasicBatch<Scalar>& batch) {
   MaskedSoftmax<Scalar>(policy_.ForwardTarget(batch.next_observations), batch.next_masks, &next_pi_);
   const auto min_weight = static_cast<Scalar>(spec_.config.dbr().target_min_weight());
-  critics_.TargetValue(batch.next_observations, next_pi_, min_weight, &target_);
+  critics_.EvaluateTargets(batch.next_observations);
+  ExpectedTargetValue<Scalar>(next_pi_, critics_.target1(), critics_.target2(), min_weight, &target_);
   if (spec_.config.dbr().value_penalty()) {
     EvaluateBehavior(batch.next_observations, batch.next_masks, &beta_plus_);
     Divergence<Scalar>(options_.divergence, static_cast<Scalar>(options_.mmd_sigma), next_pi_,
@@ -134,40 +118,19 @@ void DiscreteDbr<Scalar>::ComputeAdvantages(const BasicBatch<Scalar>& batch) {
 }
 
 template <class Scalar>
-absl::Status DiscreteDbr<Scalar>::Report(Scalar critic_loss, const PolicyLoss<Scalar>& policy_loss,
-                                         const BasicBatch<Scalar>& batch) {
-  const Eigen::Map<const Eigen::ArrayXf> advantages(advantages_.data(),
-                                                    static_cast<Eigen::Index>(advantages_.size()));
-  const double mean = advantages.mean();
-  const double values[] = {critic_loss,
-                           policy_loss.loss,
-                           beta_plus_.loss,
-                           beta_minus_.loss,
-                           policy_loss.divergence_plus,
-                           policy_loss.divergence_minus,
-                           policy_loss.threshold,
-                           multiplier_.value(),
-                           policy_loss.entropy,
-                           policy_loss.value,
-                           target_.mean(),
-                           mean,
-                           static_cast<double>((advantages >= 0).count()) / static_cast<double>(batch.size()),
-                           std::sqrt((advantages - static_cast<float>(mean)).square().mean())};
-  for (std::size_t i = 0; i < metrics_.size(); ++i) {
-    metrics_[i].value = values[i];
-    if (!std::isfinite(values[i])) {
-      return absl::InternalError(
-          absl::StrCat("update ", updates_, ": ", metrics_[i].name,
-                       " is not finite. Resume from the last checkpoint with a smaller learning_rate."));
-    }
-  }
-  return absl::OkStatus();
+absl::Status DiscreteDbr<Scalar>::Report(Scalar critic_loss, const PolicyLoss<Scalar>& policy_loss) {
+  const AdvantageFigures advantages = FiguresOf(advantages_);
+  return SetMetrics(
+      {critic_loss, policy_loss.loss, beta_plus_.loss, beta_minus_.loss, policy_loss.divergence_plus,
+       policy_loss.divergence_minus, policy_loss.threshold, multiplier_.value(), policy_loss.entropy,
+       policy_loss.value, target_.mean(), advantages.mean, advantages.positive, advantages.deviation},
+      updates_, &metrics_);
 }
 
 template <class Scalar>
 double DiscreteDbr<Scalar>::UpdateFlops() const {
   const double n = needs_.uniform;
-  double flops = critics_.Flops(needs_.uniform);
+  double flops = critics_.TargetFlops(needs_.uniform) + critics_.FitFlops(needs_.uniform);
   for (const int behavior : {needs_.plus, needs_.minus}) {
     flops += shape_.ForwardFlops(behavior) + shape_.ParameterGradientFlops(behavior);
   }
@@ -178,21 +141,13 @@ double DiscreteDbr<Scalar>::UpdateFlops() const {
 
 template <class Scalar>
 void DiscreteDbr<Scalar>::ExportPolicy(PolicySnapshot* snapshot) const {
-  snapshot->spec = {.env = spec_.env,
-                    .algorithm = "dbr",
-                    .observation_size = spec_.observation_size,
-                    .actions = spec_.actions,
-                    .hidden_sizes = spec_.hidden_sizes};
+  BeginExport(spec_, snapshot);
   snapshot->support_epsilon = static_cast<float>(spec_.config.dbr().epsilon());
-  snapshot->networks.clear();
-  const auto add = [&](const char* name, const VectorX<Scalar>& parameters) {
-    snapshot->networks.emplace_back(name, std::vector<float>(parameters.begin(), parameters.end()));
-  };
-  add(kPolicyNetwork, policy_.parameters());
-  add(kCritic1, critics_.first().parameters());
-  add(kCritic2, critics_.second().parameters());
-  add(kBetaPlus, beta_plus_.network.parameters());
-  add(kBetaMinus, beta_minus_.network.parameters());
+  ExportNetwork(kPolicyNetwork, policy_.parameters(), snapshot);
+  ExportNetwork(kCritic1, critics_.first().parameters(), snapshot);
+  ExportNetwork(kCritic2, critics_.second().parameters(), snapshot);
+  ExportNetwork(kBetaPlus, beta_plus_.network.parameters(), snapshot);
+  ExportNetwork(kBetaMinus, beta_minus_.network.parameters(), snapshot);
 }
 
 template <class Scalar>
@@ -219,31 +174,8 @@ absl::Status DiscreteDbr<Scalar>::Load(const TensorFile& file) {
 template class DiscreteDbr<float>;
 template class DiscreteDbr<double>;
 
-namespace {
-
-// DiscreteDbr behind the interface.
-class DiscreteDbrAlgorithm final : public Algorithm {
- public:
-  explicit DiscreteDbrAlgorithm(const AlgorithmSpec& spec) : dbr_(spec) {}
-  BatchNeeds needs() const override { return dbr_.needs(); }
-  absl::Status Update(const UpdateBatches& batches) override {
-    return dbr_.Update(batches.uniform, batches.plus, batches.minus);
-  }
-  absl::Span<const float> advantages() const override { return dbr_.advantages(); }
-  absl::Span<const UpdateMetric> metrics() const override { return dbr_.metrics(); }
-  double UpdateFlops() const override { return dbr_.UpdateFlops(); }
-  void ExportPolicy(PolicySnapshot* snapshot) const override { dbr_.ExportPolicy(snapshot); }
-  void Save(TensorFile* file) const override { dbr_.Save(file); }
-  absl::Status Load(const TensorFile& file) override { return dbr_.Load(file); }
-
- private:
-  DiscreteDbr<float> dbr_;
-};
-
-}  // namespace
-
 std::unique_ptr<Algorithm> MakeDiscreteDbr(const AlgorithmSpec& spec) {
-  return std::make_unique<DiscreteDbrAlgorithm>(spec);
+  return std::make_unique<AlgorithmAdapter<DiscreteDbr>>(spec);
 }
 
 }  // namespace dbr

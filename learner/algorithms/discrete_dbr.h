@@ -63,8 +63,7 @@ class DiscreteDbr {
   void ComputeTargets(const BasicBatch<Scalar>& batch);
   PolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
   void ComputeAdvantages(const BasicBatch<Scalar>& batch);
-  absl::Status Report(Scalar critic_loss, const PolicyLoss<Scalar>& policy_loss,
-                      const BasicBatch<Scalar>& batch);
+  absl::Status Report(Scalar critic_loss, const PolicyLoss<Scalar>& policy_loss);
 
   AlgorithmSpec spec_;
   BatchNeeds needs_;

@@ -2,7 +2,9 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "learner/algorithm.h"
+#include "learner/algorithms/continuous_dbr.h"
 #include "learner/algorithms/discrete_dbr.h"
+#include "learner/algorithms/sac.h"
 
 namespace dbr {
 namespace {
@@ -16,14 +18,31 @@ struct Entry {
 
 constexpr Entry kAlgorithms[] = {
     {"dbr", AlgorithmConfig::kDbr, ActionKind::kDiscrete, MakeDiscreteDbr},
+    {"dbr", AlgorithmConfig::kDbr, ActionKind::kContinuous, MakeContinuousDbr},
+    {"sac", AlgorithmConfig::kSac, ActionKind::kContinuous, MakeSac},
 };
+
+// Options that serve one kind of action alone.
+absl::Status CheckOptions(const AlgorithmSpec& spec) {
+  const DbrConfig& dbr = spec.config.dbr();
+  if (spec.actions.discrete() && IsSampled(dbr.divergence())) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("algorithm.dbr.divergence: expected KL or MMD_EXACT for the discrete actions of '",
+                     spec.env, "', found ", DbrConfig::Divergence_Name(dbr.divergence())));
+  }
+  return absl::OkStatus();
+}
+
+const char* NameOf(ActionKind kind) {
+  return kind == ActionKind::kDiscrete ? "discrete" : "continuous";
+}
 
 }  // namespace
 
-std::vector<std::string> AlgorithmNames() {
-  std::vector<std::string> names;
-  for (const Entry& entry : kAlgorithms) names.push_back(entry.name);
-  return names;
+std::vector<AlgorithmId> Algorithms() {
+  std::vector<AlgorithmId> algorithms;
+  for (const Entry& entry : kAlgorithms) algorithms.push_back({entry.name, entry.actions});
+  return algorithms;
 }
 
 std::string AlgorithmName(const AlgorithmConfig& config) {
@@ -34,15 +53,19 @@ std::string AlgorithmName(const AlgorithmConfig& config) {
 }
 
 absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& spec) {
+  std::vector<std::string> serving;
   for (const Entry& entry : kAlgorithms) {
+    if (entry.actions != spec.actions.kind) continue;
+    serving.push_back(entry.name);
     if (entry.config_case != spec.config.algorithm_case()) continue;
-    if (entry.actions == spec.actions.kind) return entry.make(spec);
-    return absl::InvalidArgumentError(absl::StrCat("algorithm '", entry.name, "' does not serve the ",
-                                                   spec.actions.discrete() ? "discrete" : "continuous",
-                                                   " action space of environment '", spec.env, "'"));
+    if (absl::Status status = CheckOptions(spec); !status.ok()) return status;
+    return entry.make(spec);
   }
-  return absl::InvalidArgumentError(absl::StrCat("config field 'algorithm' names none: expected one of ",
-                                                 absl::StrJoin(AlgorithmNames(), ", ")));
+  const std::string name = AlgorithmName(spec.config);
+  return absl::InvalidArgumentError(absl::StrCat("config field 'algorithm': expected one that serves the ",
+                                                 NameOf(spec.actions.kind), " actions of environment '",
+                                                 spec.env, "' (", absl::StrJoin(serving, ", "), "), found ",
+                                                 name.empty() ? "none" : name));
 }
 
 }  // namespace dbr

@@ -91,21 +91,11 @@ PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, cons
   Divergence(options.divergence, sigma, policy, beta_minus, &workspace->minus, &workspace->d_minus);
   result.divergence_plus = workspace->plus.mean();
   result.divergence_minus = workspace->minus.mean();
-  bool moved_by_minus = false;
-  switch (options.constraint) {
-    case DbrConfig::DYNAMIC_MAX:
-      moved_by_minus = result.divergence_minus > epsilon;
-      break;
-    case DbrConfig::DYNAMIC_MIN:
-      moved_by_minus = result.divergence_minus < epsilon;
-      break;
-    case DbrConfig::FIXED:
-      break;
-  }
-  result.threshold = moved_by_minus ? result.divergence_minus : epsilon;
+  const Threshold<Scalar> threshold = ThresholdOf(options.constraint, epsilon, result.divergence_minus);
+  result.threshold = threshold.value;
   result.loss += alpha * (result.divergence_plus - result.threshold);
   *d_logits += alpha / n * workspace->d_plus;
-  if (options.repel_negative && moved_by_minus) *d_logits -= alpha / n * workspace->d_minus;
+  if (options.repel_negative && threshold.moved_by_minus) *d_logits -= alpha / n * workspace->d_minus;
 
   Entropy(policy, &workspace->entropy);
   result.entropy = workspace->entropy.mean();

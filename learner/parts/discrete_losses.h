@@ -3,6 +3,7 @@
 #pragma once
 
 #include "core/batch.h"
+#include "learner/parts/dual_behavior.h"
 #include "nn/categorical.h"
 #include "nn/mlp.h"
 #include "proto/config.pb.h"
@@ -26,27 +27,6 @@ Scalar CriticLoss(const ConstMatrixRef<Scalar>& q, const ConstMatrixRef<Scalar>&
 template <class Scalar>
 void Divergence(DbrConfig::Divergence kind, Scalar mmd_sigma, const Categorical<Scalar>& p,
                 const Categorical<Scalar>& q, VectorX<Scalar>* divergence, MatrixX<Scalar>* d_probabilities);
-
-struct PolicyLossOptions {
-  DbrConfig::Constraint constraint = DbrConfig::DYNAMIC_MAX;
-  DbrConfig::Divergence divergence = DbrConfig::KL;
-  double epsilon = 0.05;
-  double mmd_sigma = 1;
-  bool repel_negative = false;
-  bool normalize_q = false;
-  double entropy_weight = 0;
-  bool use_q = true;  // false during the warm start
-};
-
-template <class Scalar>
-struct PolicyLoss {
-  Scalar loss = 0;              // the objective with alpha as a constant
-  Scalar value = 0;             // E[min_i sum_a pi(a|s) Q_i(s, a)]
-  Scalar divergence_plus = 0;   // mean D(pi, beta+)
-  Scalar divergence_minus = 0;  // mean D(pi, beta-)
-  Scalar threshold = 0;         // c
-  Scalar entropy = 0;           // mean, nats
-};
 
 // Workspaces of DualBehaviorPolicyLoss; reused from batch to batch.
 template <class Scalar>

@@ -1,4 +1,5 @@
-// The Lagrange multiplier of a divergence constraint.
+// The Lagrange multiplier of a constraint: of DBR's on a divergence, of SAC's on the entropy (its
+// temperature).
 #pragma once
 
 #include <algorithm>
@@ -10,22 +11,29 @@
 
 namespace dbr {
 
-// alpha = exp(log_alpha), log_alpha in [-5, 10]; gradient ascent on alpha * violation by Adam (as BEAR's).
+struct MultiplierLimits {
+  double min_log = -5;  // as BEAR's
+  double max_log = 10;
+};
+
+// alpha = exp(log_alpha); gradient ascent on alpha * violation by Adam.
 template <class Scalar>
 class Multiplier {
  public:
-  Multiplier(double first_value, double learning_rate)
-      : log_alpha_(VectorX<Scalar>::Constant(1, static_cast<Scalar>(std::log(first_value)))),
+  Multiplier(double first_value, double learning_rate, const MultiplierLimits& limits = {})
+      : limits_(limits),
+        log_alpha_(VectorX<Scalar>::Constant(1, static_cast<Scalar>(std::log(first_value)))),
         gradient_(VectorX<Scalar>::Zero(1)),
         adam_(1, learning_rate) {}
 
   Scalar value() const { return std::exp(log_alpha_[0]); }
 
-  // One step with violation = D - c.
+  // One step; where `violation` (of a divergence: D - c) is above 0 the multiplier grows.
   void Step(Scalar violation) {
     gradient_[0] = -value() * violation;
     adam_.Step(gradient_, &log_alpha_);
-    log_alpha_[0] = std::clamp(log_alpha_[0], Scalar{-5}, Scalar{10});
+    log_alpha_[0] =
+        std::clamp(log_alpha_[0], static_cast<Scalar>(limits_.min_log), static_cast<Scalar>(limits_.max_log));
   }
 
   void Save(TensorFile* file) const {
@@ -46,6 +54,7 @@ class Multiplier {
   }
 
  private:
+  MultiplierLimits limits_;
   VectorX<Scalar> log_alpha_;
   VectorX<Scalar> gradient_;
   Adam<Scalar> adam_;

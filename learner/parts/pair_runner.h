@@ -6,8 +6,16 @@
 
 #include "absl/base/thread_annotations.h"
 #include "absl/synchronization/mutex.h"
+#include "proto/config.pb.h"
 
 namespace dbr {
+
+// Threads of an update: the config's, or where that is 0 two on a machine of four cores or more, whose actors
+// leave room for the second one.
+inline int UpdateThreads(const AlgorithmConfig& config) {
+  if (config.threads() > 0) return static_cast<int>(config.threads());
+  return std::thread::hardware_concurrency() >= 4 ? 2 : 1;
+}
 
 // Runs pairs of functions, the second one on a thread of its own where there are two threads. The results do
 // not depend on the number of threads. One caller at a time; allocates nothing in Run.

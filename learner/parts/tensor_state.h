@@ -8,6 +8,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "core/batch.h"
+#include "core/rng.h"
 #include "core/safetensors.h"
 
 namespace dbr {
@@ -48,6 +49,22 @@ inline absl::Status GetCounter(const std::string& name, const TensorFile& file, 
     return absl::DataLossError(absl::StrCat("the checkpoint has no counter '", name, "'"));
   }
   return absl::OkStatus();
+}
+
+// The state of a random generator, as four counters.
+inline void PutRng(const std::string& name, const Rng& rng, TensorFile* file) {
+  for (std::size_t i = 0; i < rng.state().size(); ++i) {
+    PutCounter(absl::StrCat(name, ".", i), rng.state()[i], file);
+  }
+}
+inline absl::Status GetRng(const std::string& name, const TensorFile& file, Rng* rng) {
+  Rng::State state;
+  absl::Status status;
+  for (std::size_t i = 0; i < state.size(); ++i) {
+    status.Update(GetCounter(absl::StrCat(name, ".", i), file, &state[i]));
+  }
+  rng->set_state(state);
+  return status;
 }
 
 }  // namespace dbr

@@ -34,9 +34,18 @@ class TrainedNetwork {
   const MatrixX<Scalar>& Forward(const ConstMatrixRef<Scalar>& x) {
     return MlpForward(shape_, parameters_.data(), x, &activations_);
   }
+  // [output x n] of the online network where no gradient is asked for; leaves what Forward keeps alone.
+  const MatrixX<Scalar>& Evaluate(const ConstMatrixRef<Scalar>& x) {
+    return MlpForward(shape_, parameters_.data(), x, &target_activations_);
+  }
   // [output x n] of the target network; no gradient is taken through it.
   const MatrixX<Scalar>& ForwardTarget(const ConstMatrixRef<Scalar>& x) {
     return MlpForward(shape_, target_.data(), x, &target_activations_);
+  }
+  // The gradient with respect to the x [input x n] of the newest Forward; the parameters' gradient is not
+  // touched.
+  void InputGradient(const ConstMatrixRef<Scalar>& d_output, MatrixX<Scalar>* d_x) {
+    MlpInputGradient(shape_, parameters_.data(), d_output, &activations_, d_x);
   }
   // The gradient for the newest Forward(x) from the loss's gradient with respect to its output.
   void ComputeGradient(const ConstMatrixRef<Scalar>& x, const ConstMatrixRef<Scalar>& d_output) {

@@ -1,53 +1,70 @@
-// Two critics with Polyak targets over discrete actions, each on a thread of its own where the runner has
-// two.
+// Two critics with Polyak targets, each on a thread of its own where the runner has two.
 #pragma once
 
 #include <string>
 
 #include "absl/status/status.h"
-#include "learner/parts/discrete_losses.h"
+#include "core/policy_snapshot.h"
 #include "learner/parts/pair_runner.h"
 #include "learner/parts/trained_network.h"
 
 namespace dbr {
 
-// One thread at a time.
+// What a critic says is [outputs x n]: a value for each action, or one value where the action is part of the
+// input x [input x n]. One thread at a time.
 template <class Scalar>
 class TwinCritic {
  public:
   // `runner` outlives the critics.
   TwinCritic(const MlpShape& shape, double learning_rate, Rng& rng, PairRunner* runner)
       : runner_(runner),
-        first_{TrainedNetwork<Scalar>(shape, learning_rate, /*with_target=*/true, rng), {}, {}, 0},
-        second_{TrainedNetwork<Scalar>(shape, learning_rate, /*with_target=*/true, rng), {}, {}, 0} {}
+        first_{TrainedNetwork<Scalar>(shape, learning_rate, /*with_target=*/true, rng), {}, {}, {}, 0},
+        second_{TrainedNetwork<Scalar>(shape, learning_rate, /*with_target=*/true, rng), {}, {}, {}, 0} {}
 
-  // [n] V'(s') of the targets under `policy` (of the next states).
-  void TargetValue(const ConstMatrixRef<Scalar>& next_observations, const Categorical<Scalar>& policy,
-                   Scalar min_weight, VectorX<Scalar>* value) {
-    const MatrixX<Scalar>*q1 = nullptr, *q2 = nullptr;
-    runner_->Run([&] { q1 = &first_.network.ForwardTarget(next_observations); },
-                 [&] { q2 = &second_.network.ForwardTarget(next_observations); });
-    ExpectedTargetValue<Scalar>(policy, *q1, *q2, min_weight, value);
+  // Evaluates the targets; their values are target1(), target2() until the next call.
+  void EvaluateTargets(const ConstMatrixRef<Scalar>& x) {
+    runner_->Run([&] { first_.target = &first_.network.ForwardTarget(x); },
+                 [&] { second_.target = &second_.network.ForwardTarget(x); });
   }
+  const MatrixX<Scalar>& target1() const { return *first_.target; }
+  const MatrixX<Scalar>& target2() const { return *second_.target; }
 
-  // Regresses both on y [n]; keeps the values from before the step in q1(), q2() [actions x n]. The two
-  // losses' mean.
-  Scalar Fit(const ConstMatrixRef<Scalar>& observations, const ConstMatrixRef<Scalar>& actions,
-             const VectorX<Scalar>& y) {
-    runner_->Run([&] { FitOne(observations, actions, y, &first_); },
-                 [&] { FitOne(observations, actions, y, &second_); });
+  // One step of both on loss(q, &d_q), which gives a critic's loss and its gradient with respect to q
+  // [outputs x n] and may run on two threads at once. Keeps the values from before the step in q1(), q2().
+  // The two losses' mean.
+  template <class Loss>
+  Scalar Fit(const ConstMatrixRef<Scalar>& x, const Loss& loss) {
+    const auto fit = [&](Critic* critic) {
+      critic->q = critic->network.Forward(x);
+      critic->loss = loss(critic->q, &critic->d_q);
+      critic->network.Step(x, critic->d_q);
+    };
+    runner_->Run([&] { fit(&first_); }, [&] { fit(&second_); });
     return (first_.loss + second_.loss) / 2;
   }
   const MatrixX<Scalar>& q1() const { return first_.q; }
   const MatrixX<Scalar>& q2() const { return second_.q; }
+
+  // Evaluates the critics as they are: q1(), q2().
+  void Evaluate(const ConstMatrixRef<Scalar>& x) {
+    runner_->Run([&] { first_.q = first_.network.Forward(x); },
+                 [&] { second_.q = second_.network.Forward(x); });
+  }
+  // The gradient of sum(d_q1 .* q1 + d_q2 .* q2) with respect to the x [input x n] of the newest Evaluate.
+  const MatrixX<Scalar>& InputGradient(const ConstMatrixRef<Scalar>& d_q1,
+                                       const ConstMatrixRef<Scalar>& d_q2) {
+    runner_->Run([&] { first_.network.InputGradient(d_q1, &first_.d_x); },
+                 [&] { second_.network.InputGradient(d_q2, &second_.d_x); });
+    first_.d_x += second_.d_x;
+    return first_.d_x;
+  }
 
   void set_learning_rate(double learning_rate) {
     first_.network.set_learning_rate(learning_rate);
     second_.network.set_learning_rate(learning_rate);
   }
   void UpdateTargets(double tau) {
-    first_.network.UpdateTarget(tau);
-    second_.network.UpdateTarget(tau);
+    runner_->Run([&] { first_.network.UpdateTarget(tau); }, [&] { second_.network.UpdateTarget(tau); });
   }
   const TrainedNetwork<Scalar>& first() const { return first_.network; }
   const TrainedNetwork<Scalar>& second() const { return second_.network; }
@@ -62,25 +79,24 @@ class TwinCritic {
     return status;
   }
 
-  // Useful operations of TargetValue and Fit on n samples.
-  double Flops(Eigen::Index n) const {
-    return 2 * (2 * first().shape().ForwardFlops(n) + first().shape().ParameterGradientFlops(n));
+  // Useful operations for n samples.
+  double TargetFlops(Eigen::Index n) const { return 2 * shape().ForwardFlops(n); }
+  double FitFlops(Eigen::Index n) const {
+    return 2 * (shape().ForwardFlops(n) + shape().ParameterGradientFlops(n));
   }
+  double InputGradientFlops(Eigen::Index n) const { return 4 * shape().ForwardFlops(n); }  // with Evaluate
 
  private:
   struct Critic {
     TrainedNetwork<Scalar> network;
-    MatrixX<Scalar> q;    // of the newest Fit, before its step: [actions x n]
-    MatrixX<Scalar> d_q;  // [actions x n]
+    MatrixX<Scalar> q;    // [outputs x n]
+    MatrixX<Scalar> d_q;  // [outputs x n]
+    MatrixX<Scalar> d_x;  // [input x n]
     Scalar loss;
+    const MatrixX<Scalar>* target = nullptr;  // [outputs x n]
   };
 
-  static void FitOne(const ConstMatrixRef<Scalar>& observations, const ConstMatrixRef<Scalar>& actions,
-                     const VectorX<Scalar>& y, Critic* critic) {
-    critic->q = critic->network.Forward(observations);
-    critic->loss = CriticLoss<Scalar>(critic->q, actions, y, &critic->d_q);
-    critic->network.Step(observations, critic->d_q);
-  }
+  const MlpShape& shape() const { return first_.network.shape(); }
 
   PairRunner* const runner_;
   Critic first_, second_;

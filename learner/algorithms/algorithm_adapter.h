@@ -1,0 +1,29 @@
+// An algorithm in single precision behind the interface. The algorithms are class templates, so that their
+// tests can run them in double.
+#pragma once
+
+#include "learner/algorithm.h"
+
+namespace dbr {
+
+template <template <class> class Core>
+class AlgorithmAdapter final : public Algorithm {
+ public:
+  explicit AlgorithmAdapter(const AlgorithmSpec& spec) : core_(spec) {}
+
+  BatchNeeds needs() const override { return core_.needs(); }
+  absl::Status Update(const UpdateBatches& batches) override {
+    return core_.Update(batches.uniform, batches.plus, batches.minus);
+  }
+  absl::Span<const float> advantages() const override { return core_.advantages(); }
+  absl::Span<const UpdateMetric> metrics() const override { return core_.metrics(); }
+  double UpdateFlops() const override { return core_.UpdateFlops(); }
+  void ExportPolicy(PolicySnapshot* snapshot) const override { core_.ExportPolicy(snapshot); }
+  void Save(TensorFile* file) const override { core_.Save(file); }
+  absl::Status Load(const TensorFile& file) override { return core_.Load(file); }
+
+ private:
+  Core<float> core_;
+};
+
+}  // namespace dbr

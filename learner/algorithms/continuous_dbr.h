@@ -1,0 +1,91 @@
+// Dual Behavior Regularized reinforcement learning over continuous actions (Siu, Traish, Xu 2021).
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/rng.h"
+#include "learner/algorithm.h"
+#include "learner/parts/dual_behavior_objective.h"
+#include "learner/parts/multiplier.h"
+#include "learner/parts/pair_runner.h"
+#include "learner/parts/trained_network.h"
+#include "learner/parts/twin_critic.h"
+
+namespace dbr {
+
+// State: policy pi with target pi', twin critics with targets, the behaviour policies beta+ of D+ and beta-
+// of D- (all three tanh-Gaussian), and a multiplier alpha. One update, with B drawn from D, B+ from D+ and B-
+// from D-:
+//   1. beta+ maximises the mean of log beta+(a|s) over B+, beta- over B- (an empty part skips its step).
+//   2. y = r + discount * V'(s'), V' the greatest over target_samples draws from pi' of
+//      0.75 min_i Q'_i + 0.25 max_i Q'_i; with value_penalty less alpha * D(pi'(.|s'), beta+(.|s')) (the
+//      paper's equation for V under beta+). Each critic regresses on y.
+//   3. pi minimises -E[min_i mean_k Q_i(s, a_k)] + alpha * (D(pi, beta+) - c), the dynamic constraint of the
+//      paper's section "From ARM and BEAR to DBR" (parts/dual_behavior_objective.h).
+//   4. alpha ascends on alpha * (D(pi, beta+) - c).
+//   5. Polyak averaging of the critics and of pi.
+//   6. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin, V its mean over the draws of step 3.
+// Departures: step 6 takes Q(s, a) from before step 2's gradient step, so that nothing is computed twice.
+template <class Scalar>
+class ContinuousDbr {
+ public:
+  explicit ContinuousDbr(const AlgorithmSpec& spec);
+
+  absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
+                      const BasicBatch<Scalar>& minus);
+
+  BatchNeeds needs() const { return needs_; }
+  const std::vector<float>& advantages() const { return advantages_; }
+  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
+  double UpdateFlops() const;
+  void ExportPolicy(PolicySnapshot* snapshot) const;
+  void Save(TensorFile* file) const;
+  absl::Status Load(const TensorFile& file);
+
+ private:
+  // A behaviour policy with the workspaces of its fit.
+  struct Behavior {
+    TrainedNetwork<Scalar> network;
+    GaussianHead<Scalar> head = {};  // at the states of the newest use
+    VectorX<Scalar> log_prob = {};
+    GaussianGradient<Scalar> gradient = {};
+    MatrixX<Scalar> d_output = {};
+    Scalar loss = 0;  // mean of -log beta(a|s) in the newest fit
+  };
+
+  void SetLearningRate(double learning_rate);
+  static void FitBehavior(const BasicBatch<Scalar>& batch, Behavior* behavior);
+  void ComputeTargets(const BasicBatch<Scalar>& batch);
+  Scalar FitCritics(const BasicBatch<Scalar>& batch);
+  PolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
+  void DrawDivergenceNoise(Eigen::Index n);
+  absl::Status Report(Scalar critic_loss, const PolicyLoss<Scalar>& policy_loss);
+
+  AlgorithmSpec spec_;
+  BatchNeeds needs_;
+  PolicyLossOptions options_;
+  Rng rng_;
+  MlpShape policy_shape_, critic_shape_;
+  PairRunner runner_;
+  TrainedNetwork<Scalar> policy_;
+  TwinCritic<Scalar> critics_;
+  Behavior beta_plus_;
+  Behavior beta_minus_;
+  Multiplier<Scalar> multiplier_;
+  std::uint64_t updates_ = 0;
+
+  GaussianHead<Scalar> pi_, next_pi_;
+  SampledActions<Scalar> next_draws_;
+  DualBehaviorObjective<Scalar> objective_;
+  GaussianDivergence<Scalar> penalty_;
+  ObjectiveNoise<Scalar> noise_;
+  MatrixX<Scalar> next_noise_, inputs_, d_output_;
+  VectorX<Scalar> target_, behavior_value_, value_;
+  std::vector<float> advantages_;
+  std::vector<UpdateMetric> metrics_;
+};
+
+std::unique_ptr<Algorithm> MakeContinuousDbr(const AlgorithmSpec& spec);
+
+}  // namespace dbr

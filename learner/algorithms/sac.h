@@ -1,0 +1,73 @@
+// Soft Actor-Critic over continuous actions (Haarnoja et al. 2018, "Soft Actor-Critic Algorithms and
+// Applications").
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/rng.h"
+#include "learner/algorithm.h"
+#include "learner/parts/continuous_losses.h"
+#include "learner/parts/multiplier.h"
+#include "learner/parts/pair_runner.h"
+#include "learner/parts/sampled_actions.h"
+#include "learner/parts/trained_network.h"
+#include "learner/parts/twin_critic.h"
+#include "nn/gaussian_head.h"
+
+namespace dbr {
+
+// State: policy pi, twin critics with targets, a temperature. One update on a batch B drawn uniformly from D:
+//   1. y = r + discount * (min_i Q'_i(s', a') - temperature * log pi(a'|s')), a' drawn from pi (equations 5,
+//   3);
+//      each critic regresses on y.
+//   2. pi minimises E[temperature * log pi(a|s) - min_i Q_i(s, a)], a drawn through pi (equation 9).
+//   3. The temperature rises where the entropy is below its target, and falls above it (equation 18).
+//   4. Polyak averaging of the critics.
+//   5. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin before its step, V at the action that
+//      step 2 drew.
+template <class Scalar>
+class Sac {
+ public:
+  explicit Sac(const AlgorithmSpec& spec);
+
+  // `plus` and `minus` are not used.
+  absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
+                      const BasicBatch<Scalar>& minus);
+
+  BatchNeeds needs() const { return {.uniform = static_cast<int>(spec_.config.batch_size())}; }
+  const std::vector<float>& advantages() const { return advantages_; }
+  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
+  double UpdateFlops() const;
+  void ExportPolicy(PolicySnapshot* snapshot) const;
+  void Save(TensorFile* file) const;
+  absl::Status Load(const TensorFile& file);
+
+ private:
+  Scalar FitCritics(const BasicBatch<Scalar>& batch);
+  Scalar ImprovePolicy(const BasicBatch<Scalar>& batch);
+
+  AlgorithmSpec spec_;
+  Rng rng_;
+  MlpShape policy_shape_, critic_shape_;
+  PairRunner runner_;
+  TrainedNetwork<Scalar> policy_;
+  TwinCritic<Scalar> critics_;
+  Multiplier<Scalar> temperature_;
+  Scalar target_entropy_;  // nats
+  std::uint64_t updates_ = 0;
+
+  GaussianHead<Scalar> head_;
+  SampledActions<Scalar> draws_;
+  MatrixX<Scalar> noise_, inputs_, d_output_;
+  VectorX<Scalar> target_, behavior_value_, value_, d_log_prob_;
+  QTerm<Scalar> q_term_;
+  GaussianGradient<Scalar> gradient_;
+  Scalar entropy_ = 0;
+  std::vector<float> advantages_;
+  std::vector<UpdateMetric> metrics_;
+};
+
+std::unique_ptr<Algorithm> MakeSac(const AlgorithmSpec& spec);
+
+}  // namespace dbr

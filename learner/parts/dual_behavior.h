@@ -1,0 +1,65 @@
+// What DBR over discrete and over continuous actions have in common: its draws, the options and the figures
+// of its policy loss, and the constraint's threshold.
+#pragma once
+
+#include "learner/algorithm.h"
+#include "proto/config.pb.h"
+
+namespace dbr {
+
+// B from D for the critics and the policy, B+ and B- for the behaviour policies.
+inline BatchNeeds DualBehaviorNeeds(const AlgorithmConfig& config) {
+  const int batch = static_cast<int>(config.batch_size());
+  const int behavior =
+      config.dbr().behavior_batch_size() > 0 ? static_cast<int>(config.dbr().behavior_batch_size()) : batch;
+  return {.uniform = batch, .plus = behavior, .minus = behavior};
+}
+
+struct PolicyLossOptions {
+  DbrConfig::Constraint constraint = DbrConfig::DYNAMIC_MAX;
+  DbrConfig::Divergence divergence = DbrConfig::KL;
+  double epsilon = 0.05;
+  double mmd_sigma = 1;
+  bool repel_negative = false;
+  bool normalize_q = false;
+  double entropy_weight = 0;
+  bool use_q = true;  // false during the warm start
+
+  static PolicyLossOptions Of(const DbrConfig& config) {
+    return {.constraint = config.constraint(),
+            .divergence = config.divergence(),
+            .epsilon = config.epsilon(),
+            .mmd_sigma = config.mmd_sigma(),
+            .repel_negative = config.repel_negative(),
+            .normalize_q = config.normalize_q(),
+            .entropy_weight = config.entropy_weight(),
+            .use_q = config.warm_start_updates() == 0};
+  }
+};
+
+template <class Scalar>
+struct PolicyLoss {
+  Scalar loss = 0;              // the objective with alpha as a constant
+  Scalar value = 0;             // E[min_i E_pi Q_i(s, a)]
+  Scalar divergence_plus = 0;   // mean D(pi, beta+)
+  Scalar divergence_minus = 0;  // mean D(pi, beta-)
+  Scalar threshold = 0;         // c
+  Scalar entropy = 0;           // mean, nats
+};
+
+template <class Scalar>
+struct Threshold {
+  Scalar value = 0;             // c
+  bool moved_by_minus = false;  // c is D(pi, beta-), not eps
+};
+
+// c of D(pi, beta+) <= c for the batch's mean divergence from beta-: max(eps, D-) as the paper prints it, or
+// min(eps, D-), or eps alone (docs/algorithms.md, DBR step 3).
+template <class Scalar>
+Threshold<Scalar> ThresholdOf(DbrConfig::Constraint constraint, Scalar epsilon, Scalar divergence_minus) {
+  const bool moved = (constraint == DbrConfig::DYNAMIC_MAX && divergence_minus > epsilon) ||
+                     (constraint == DbrConfig::DYNAMIC_MIN && divergence_minus < epsilon);
+  return {moved ? divergence_minus : epsilon, moved};
+}
+
+}  // namespace dbr

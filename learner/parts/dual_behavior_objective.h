@@ -1,0 +1,58 @@
+// DBR's policy loss over continuous actions with its gradient.
+#pragma once
+
+#include "learner/parts/continuous_losses.h"
+#include "learner/parts/dual_behavior.h"
+#include "learner/parts/gaussian_divergence.h"
+#include "learner/parts/sampled_actions.h"
+#include "learner/parts/twin_critic.h"
+
+namespace dbr {
+
+// Noise of one evaluation of the loss.
+template <class Scalar>
+struct ObjectiveNoise {
+  MatrixX<Scalar> actions;          // [dimensions x samples * n]
+  MatrixX<Scalar> pi, plus, minus;  // [dimensions x n * divergence samples]; empty for an exact divergence
+};
+
+// The three policies at the states of a batch.
+template <class Scalar>
+struct PolicyHeads {
+  const GaussianHead<Scalar>& pi;
+  const GaussianHead<Scalar>& beta_plus;
+  const GaussianHead<Scalar>& beta_minus;
+};
+
+// Workspaces, reused from batch to batch.
+template <class Scalar>
+class DualBehaviorObjective {
+ public:
+  // -E[min_i mean_k Q_i(s, a_k)] / scale - w H(pi) + alpha * (D(pi, beta+) - c), a_k drawn from pi, c by
+  // options.constraint (docs/algorithms.md, DBR step 3), and its gradient with respect to the output of pi's
+  // network [2 * dimensions x n]. beta+, beta-, the critics' weights and the scale of normalize_q are
+  // constants; so is c unless repel_negative. The entropy is that of the draws.
+  PolicyLoss<Scalar> Compute(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
+                             const MatrixX<Scalar>& observations, const ObjectiveNoise<Scalar>& noise,
+                             Scalar alpha, TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output);
+
+  // V(s) [n]: the mean over the draws of the smaller twin.
+  void StateValue(const TwinCritic<Scalar>& critics, VectorX<Scalar>* value) const {
+    MeanOfSmaller<Scalar>(critics.q1(), critics.q2(), value);
+  }
+
+ private:
+  void AddQTerm(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
+                const MatrixX<Scalar>& observations, const ObjectiveNoise<Scalar>& noise,
+                TwinCritic<Scalar>* critics, PolicyLoss<Scalar>* result);
+  void AddConstraint(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
+                     const ObjectiveNoise<Scalar>& noise, Scalar alpha, PolicyLoss<Scalar>* result);
+
+  SampledActions<Scalar> samples_;
+  QTerm<Scalar> q_term_;
+  VectorX<Scalar> d_log_prob_;
+  GaussianDivergence<Scalar> plus_, minus_;
+  GaussianGradient<Scalar> gradient_;
+};
+
+}  // namespace dbr

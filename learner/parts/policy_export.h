@@ -1,0 +1,25 @@
+// Filling a policy's snapshot from an algorithm's networks.
+#pragma once
+
+#include <vector>
+
+#include "learner/algorithm.h"
+
+namespace dbr {
+
+// The spec; no networks yet.
+inline void BeginExport(const AlgorithmSpec& spec, PolicySnapshot* snapshot) {
+  snapshot->spec = {.env = spec.env,
+                    .algorithm = AlgorithmName(spec.config),
+                    .observation_size = spec.observation_size,
+                    .actions = spec.actions,
+                    .hidden_sizes = spec.hidden_sizes};
+  snapshot->networks.clear();
+}
+
+template <class Scalar>
+void ExportNetwork(const char* name, const VectorX<Scalar>& parameters, PolicySnapshot* snapshot) {
+  snapshot->networks.emplace_back(name, std::vector<float>(parameters.begin(), parameters.end()));
+}
+
+}  // namespace dbr

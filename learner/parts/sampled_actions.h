@@ -1,0 +1,64 @@
+// Draws from a tanh-Gaussian policy at every state of a batch, and the way back through them.
+#pragma once
+
+#include "core/batch.h"
+#include "core/rng.h"
+#include "nn/gaussian_head.h"
+#include "nn/tanh_gaussian.h"
+
+namespace dbr {
+
+// Standard normal noise, for a loss to take as an argument.
+template <class Scalar>
+void FillNormal(Rng& rng, Eigen::Index rows, Eigen::Index cols, MatrixX<Scalar>* noise) {
+  noise->resize(rows, cols);
+  for (Eigen::Index i = 0; i < noise->size(); ++i) noise->data()[i] = static_cast<Scalar>(rng.Normal());
+}
+
+// `count` draws of each of n states: draw k of state j is column k * n + j. Reused from batch to batch.
+template <class Scalar>
+class SampledActions {
+ public:
+  // noise [dimensions x count * n].
+  void Draw(const GaussianHead<Scalar>& head, const MatrixX<Scalar>& noise) {
+    n_ = head.mean().cols();
+    count_ = noise.cols() / n_;
+    noise_ = noise;
+    mean_ = head.mean().replicate(1, count_);
+    log_std_ = head.log_std().replicate(1, count_);
+    SampleTanhGaussian<Scalar>({mean_, log_std_}, noise_, &sample_);
+  }
+
+  Eigen::Index count() const { return count_; }
+  const TanhSample<Scalar>& sample() const { return sample_; }
+
+  // [observation + dimensions x count * n]: what a critic takes.
+  const MatrixX<Scalar>& CriticInput(const MatrixX<Scalar>& observations) {
+    input_.resize(observations.rows() + sample_.action.rows(), count_ * n_);
+    for (Eigen::Index k = 0; k < count_; ++k) {
+      input_.block(0, k * n_, observations.rows(), n_) = observations;
+    }
+    input_.bottomRows(sample_.action.rows()) = sample_.action;
+    return input_;
+  }
+
+  // Adds to `gradient` [dimensions x n] what flows back from gradients with respect to the critic's input (as
+  // CriticInput made it) and to the log-probabilities [count * n].
+  void Backprop(const MatrixX<Scalar>& d_input, const VectorX<Scalar>& d_log_prob,
+                GaussianGradient<Scalar>* gradient) {
+    BackpropTanhSample<Scalar>({mean_, log_std_}, noise_, sample_,
+                               {d_input.bottomRows(noise_.rows()), d_log_prob}, &each_);
+    for (Eigen::Index k = 0; k < count_; ++k) {
+      gradient->mean += each_.mean.middleCols(k * n_, n_);
+      gradient->log_std += each_.log_std.middleCols(k * n_, n_);
+    }
+  }
+
+ private:
+  Eigen::Index n_ = 0, count_ = 0;
+  MatrixX<Scalar> noise_, mean_, log_std_, input_;
+  TanhSample<Scalar> sample_;
+  GaussianGradient<Scalar> each_;
+};
+
+}  // namespace dbr
