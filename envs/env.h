@@ -19,7 +19,8 @@ struct StepResult {
   float reward = 0;
   bool terminated = false;
   bool truncated = false;
-  float score = 0;  // with the end of an episode where the spec has a score: 1 win, 0.5 draw, 0 loss
+  bool broken = false;  // truncated because the world failed: reward 0, the last sound observation once more
+  float score = 0;      // with the end of an episode where the spec has a score: 1 win, 0.5 draw, 0 loss
 
   bool done() const { return terminated || truncated; }
 };

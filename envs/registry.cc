@@ -7,18 +7,26 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "envs/bullet/hopper.h"
+#include "envs/bullet/locomotion.h"
 #include "envs/connect4/env.h"
 #include "envs/env.h"
 
 namespace dbr {
 namespace {
 
+using Made = absl::StatusOr<std::unique_ptr<Env>>;
+
 struct Entry {
   std::string name;
   std::vector<std::string> aliases;
   std::vector<std::string> evaluation_opponents;  // empty: a game of one, which takes no opponents
-  absl::StatusOr<std::unique_ptr<Env>> (*make)(const std::vector<std::string>& opponents);
+  Made (*make)(const std::vector<std::string>& opponents);
 };
+
+Made MakeHopper(const std::vector<std::string>&) {
+  return std::make_unique<bullet::LocomotionEnv>("hopper", bullet::HopperPlan());
+}
 
 const std::vector<Entry>& Entries() {
   static const auto* const entries = new std::vector<Entry>{
@@ -26,6 +34,7 @@ const std::vector<Entry>& Entries() {
        {"connect_four"},
        {"random", "one_ply", "mcts:10", "mcts:100"},
        connect4::Connect4Env::Make},
+      {"hopper", {"HopperBulletEnv-v0"}, {}, MakeHopper},
   };
   return *entries;
 }
