@@ -30,6 +30,7 @@ const std::vector<Room>& Rooms() {
       {"nn", 1, {"nn/"}},
       {"envs", 1, {"envs/"}},
       {"replay buffer", 1, {"replay/", "replay/writer_table"}},
+      {"offline data", 1, {"replay/dataset/"}},
       {"algorithms", 2, {"learner/algorithm.h", "learner/algorithms/", "learner/parts/"}},
       {"replay service",
        2,

@@ -1,0 +1,242 @@
+#include "replay/dataset/dataset_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/types/span.h"
+#include "core/status_macros.h"
+#include "replay/dataset/hdf5_file.h"
+#include "replay/dataset/step_source.h"
+
+namespace dbr {
+namespace {
+
+constexpr int kDefaultMaxEpisodeSteps = 1000;
+
+// The episode being read.
+struct OpenEpisode {
+  double episode_return = 0;
+  int length = 0;
+  bool spoiled = false;  // by a row with a value that is not finite
+};
+
+absl::StatusOr<DatasetLayout> LayoutOf(const Hdf5File& file, const DatasetOptions& options) {
+  const std::optional<std::string> attribute = file.Text("layout");
+  if (!attribute.has_value() && !options.layout.has_value()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        file.path(), ": expected a named layout, found no attribute 'layout' in the file; name it: ",
+        "d4rl, d4rl_pybullet or minari (the first two have the same keys and differ by one row, so "
+        "that a guess could train on rewards of other actions)"));
+  }
+  if (!attribute.has_value()) return *options.layout;
+  const absl::StatusOr<DatasetLayout> own = ParseDatasetLayout(*attribute);
+  if (!own.ok()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(file.path(), ": attribute 'layout': ", own.status().message()));
+  }
+  if (options.layout.has_value() && *options.layout != *own) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        file.path(), ": expected layout ", DatasetLayoutName(*options.layout),
+        ", as named, found attribute 'layout' ", "that says ", *attribute, "; name that one, or none"));
+  }
+  return *own;
+}
+
+absl::StatusOr<std::unique_ptr<StepSource>> OpenSteps(const Hdf5File& file, DatasetLayout layout,
+                                                      const StepSourceOptions& options) {
+  switch (layout) {
+    case DatasetLayout::kD4rl:
+      return OpenD4rlSteps(file, options);
+    case DatasetLayout::kD4rlPybullet:
+      return OpenPybulletSteps(file, options);
+    case DatasetLayout::kMinari:
+      return OpenMinariSteps(file, options);
+  }
+  return absl::InvalidArgumentError("unknown layout");
+}
+
+absl::Status CheckSizes(const Hdf5File& file, const StepSource& steps, const DatasetOptions& options) {
+  const bool observations_fit =
+      options.observation_size == 0 || options.observation_size == steps.observation_size();
+  const bool actions_fit = options.action_width == 0 || options.action_width == steps.action_width();
+  if (observations_fit && actions_fit) return absl::OkStatus();
+  const std::optional<std::string> env = file.Text("env");
+  return absl::InvalidArgumentError(absl::StrCat(
+      file.path(), ": expected observations of ", options.observation_size, " and actions of ",
+      options.action_width, " numbers", options.env.empty() ? "" : absl::StrCat(" (", options.env, ")"),
+      ", found ", steps.observation_size(), " and ", steps.action_width(),
+      env.has_value() ? absl::StrCat(" (", *env, ")") : "", "; the file holds data of another environment"));
+}
+
+}  // namespace
+
+struct DatasetReader::State {
+  Hdf5File file;
+  DatasetOptions options;  // what was left open is filled in
+  std::string env;
+  TransitionLayout layout;
+  std::unique_ptr<StepSource> source;
+
+  absl::Span<const Step> steps;  // read
+  std::size_t next = 0;          // of them to be handed out
+  OpenEpisode episode;
+  DatasetFacts facts;
+  double squares = 0;  // sum of squared distances of returns from their mean (Welford 1962)
+  std::int64_t returns = 0;
+  absl::Status failure;
+
+  StepSourceOptions SourceOptions(bool flags_only) const {
+    return {.max_episode_steps = options.max_episode_steps, .flags_only = flags_only};
+  }
+  absl::Status Refill();
+  absl::Status RefuseBadRows();
+  absl::Status Fill(TransitionChunk* chunk);
+  void Take(const Step& step, TransitionChunk* chunk);
+  void Write(const Step& step, TransitionChunk* chunk) const;
+  void Mark(const Step& step, TransitionChunk* chunk) const;
+  void CountEnd(bool terminal);
+};
+
+absl::Status DatasetReader::State::Refill() {
+  ASSIGN_OR_RETURN(steps, source->NextSteps());
+  next = 0;
+  facts.non_finite = source->bad_rows().count;
+  if (facts.non_finite > 0 && !options.skip_bad_rows) return RefuseBadRows();
+  return absl::OkStatus();
+}
+
+absl::Status DatasetReader::State::RefuseBadRows() {
+  while (!steps.empty()) {
+    ASSIGN_OR_RETURN(steps, source->NextSteps());
+  }
+  const BadRows bad = source->bad_rows();
+  facts.non_finite = bad.count;
+  return absl::InvalidArgumentError(
+      absl::StrCat(file.path(), ": expected finite numbers, found NaN or infinity in ", bad.count, " of ",
+                   facts.rows, " rows, the first of them row ", bad.first,
+                   " (counted from 0); repair the file, or leave such ", "rows out with --skip-bad-rows"));
+}
+
+absl::Status DatasetReader::State::Fill(TransitionChunk* chunk) {
+  while (chunk->size < chunk->capacity) {
+    if (next == steps.size()) {
+      RETURN_IF_ERROR(Refill());
+      if (steps.empty()) break;
+    }
+    Take(steps[next++], chunk);
+  }
+  return absl::OkStatus();
+}
+
+void DatasetReader::State::Take(const Step& step, TransitionChunk* chunk) {
+  episode.episode_return += step.reward;
+  ++episode.length;
+  episode.spoiled = episode.spoiled || step.bad;
+  if (step.has_next && !step.bad) {
+    Write(step, chunk);
+    if (!episode.spoiled) Mark(step, chunk);
+    ++chunk->size;
+    ++facts.transitions;
+  }
+  if (step.end == StepEnd::kNone) return;
+  CountEnd(step.end == StepEnd::kTerminal);
+  episode = {};
+}
+
+void DatasetReader::State::Write(const Step& step, TransitionChunk* chunk) const {
+  float* const row = chunk->row(chunk->size);
+  std::copy_n(step.observation, layout.observation_width, row);
+  std::copy_n(step.action, layout.action_width, row + layout.action_offset());
+  row[layout.reward_offset()] = step.reward;
+  row[layout.discount_offset()] = step.end == StepEnd::kTerminal ? 0 : options.discount;
+  std::copy_n(step.next_observation, layout.observation_width, row + layout.next_observation_offset());
+}
+
+// The transition at chunk->size may be its episode's last.
+void DatasetReader::State::Mark(const Step& step, TransitionChunk* chunk) const {
+  if (step.end == StepEnd::kNone && !step.last_transition) return;
+  EndedEpisode ended;
+  ended.index = chunk->size;
+  ended.terminal = step.end == StepEnd::kTerminal;
+  ended.end.episode_return = static_cast<float>(episode.episode_return + step.following_reward);
+  ended.end.length = episode.length + (step.last_transition ? 1 : 0);
+  chunk->ended.push_back(ended);
+}
+
+void DatasetReader::State::CountEnd(bool terminal) {
+  ++facts.episodes;
+  ++(terminal ? facts.terminals : facts.timeouts);
+  if (episode.spoiled) return;
+  const double value = episode.episode_return;
+  if (returns++ == 0) facts.return_mean = facts.return_min = facts.return_max = value;
+  const double from_old_mean = value - facts.return_mean;
+  facts.return_mean += from_old_mean / static_cast<double>(returns);
+  squares += from_old_mean * (value - facts.return_mean);
+  facts.return_std = std::sqrt(squares / static_cast<double>(returns));
+  facts.return_min = std::min(facts.return_min, value);
+  facts.return_max = std::max(facts.return_max, value);
+}
+
+absl::StatusOr<std::unique_ptr<DatasetReader>> DatasetReader::Open(const std::string& path,
+                                                                   const DatasetOptions& options) {
+  auto state = std::make_unique<State>();
+  ASSIGN_OR_RETURN(state->file, Hdf5File::Open(path));
+  state->options = options;
+  ASSIGN_OR_RETURN(state->options.layout, LayoutOf(state->file, options));
+  state->env = state->file.Text("env").value_or("");
+  if (options.max_episode_steps == 0) {
+    const std::int64_t steps = state->file.Number("max_episode_steps").value_or(0);
+    state->options.max_episode_steps = steps > 0 ? static_cast<int>(steps) : kDefaultMaxEpisodeSteps;
+  }
+  ASSIGN_OR_RETURN(state->source, OpenSteps(state->file, *state->options.layout,
+                                            state->SourceOptions(/*flags_only=*/false)));
+  RETURN_IF_ERROR(CheckSizes(state->file, *state->source, options));
+  state->layout = {.observation_width = state->source->observation_size(),
+                   .action_width = state->source->action_width()};
+  state->facts.rows = state->source->rows();
+  return std::unique_ptr<DatasetReader>(new DatasetReader(std::move(state)));
+}
+
+DatasetReader::DatasetReader(std::unique_ptr<State> state) : state_(std::move(state)) {}
+DatasetReader::~DatasetReader() = default;
+
+DatasetLayout DatasetReader::layout() const {
+  return *state_->options.layout;
+}
+const TransitionLayout& DatasetReader::transition_layout() const {
+  return state_->layout;
+}
+const std::string& DatasetReader::env() const {
+  return state_->env;
+}
+int DatasetReader::max_episode_steps() const {
+  return state_->options.max_episode_steps;
+}
+const DatasetFacts& DatasetReader::facts() const {
+  return state_->facts;
+}
+
+absl::StatusOr<int> DatasetReader::Next(TransitionChunk* chunk) {
+  DBR_CHECK(chunk->layout == state_->layout);
+  chunk->size = 0;
+  chunk->ended.clear();
+  RETURN_IF_ERROR(state_->failure);
+  state_->failure = state_->Fill(chunk);
+  RETURN_IF_ERROR(state_->failure);
+  return chunk->size;
+}
+
+absl::StatusOr<std::int64_t> DatasetReader::CountTransitions() {
+  ASSIGN_OR_RETURN(const std::unique_ptr<StepSource> source,
+                   OpenSteps(state_->file, layout(), state_->SourceOptions(/*flags_only=*/true)));
+  std::int64_t transitions = 0;
+  while (true) {
+    ASSIGN_OR_RETURN(const absl::Span<const Step> steps, source->NextSteps());
+    if (steps.empty()) return transitions;
+    for (const Step& step : steps) transitions += step.has_next;
+  }
+}
+
+}  // namespace dbr

@@ -1,0 +1,79 @@
+// A window that slides over the rows of a file with one array for each key.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/types/span.h"
+#include "replay/dataset/hdf5_file.h"
+#include "replay/dataset/step_source.h"
+
+namespace dbr {
+
+// The arrays of the layouts d4rl and d4rl_pybullet.
+struct FlatColumns {
+  // InvalidArgument for missing keys (all of them, and the keys that are there), other shapes, different
+  // lengths.
+  static absl::StatusOr<FlatColumns> Open(const Hdf5File& file, bool with_next_observations);
+
+  Hdf5Column observations;
+  Hdf5Column actions;
+  Hdf5Column rewards;
+  Hdf5Column terminals;
+  std::optional<Hdf5Column> timeouts;
+  std::optional<Hdf5Column> next_observations;
+};
+
+// Sets bad[i] where row i of `values` [rows x width] has a value that is not finite. Fast where none has.
+void MarkNonFinite(absl::Span<const float> values, int width, std::vector<std::uint8_t>* bad);
+
+// Rows in float32, a stretch at a time. Thread-compatible.
+class RowWindow {
+ public:
+  static constexpr int kStretch = 16384;  // rows read at once
+
+  RowWindow(FlatColumns columns, bool flags_only);
+
+  // Keeps the last row as row 0 and reads the following ones behind it. False where no row was left to read.
+  absl::StatusOr<bool> Advance();
+
+  int rows() const { return rows_; }
+  bool at_end() const {
+    return next_row_ == columns_.rewards.rows();
+  }  // the last row of the file is in the window
+
+  const float* observation(int i) const { return At(observations_, columns_.observations, i); }
+  const float* action(int i) const { return At(actions_, columns_.actions, i); }
+  const float* next_observation(int i) const {
+    return At(next_observations_, *columns_.next_observations, i);
+  }
+  float reward(int i) const { return flags_only_ ? 0 : rewards_[i]; }
+  bool terminal(int i) const { return terminals_[i] != 0; }
+  bool timeout(int i) const { return columns_.timeouts.has_value() && timeouts_[i] != 0; }
+  bool bad(int i) const { return bad_[i] != 0; }
+
+  const FlatColumns& columns() const { return columns_; }
+  BadRows bad_rows() const { return bad_rows_; }
+
+ private:
+  const float* At(const std::vector<float>& values, const Hdf5Column& column, int i) const {
+    return flags_only_ ? nullptr : values.data() + std::size_t{1} * i * column.width();
+  }
+  absl::Status Fill(int kept, int count);
+  absl::Status FillFloats(const Hdf5Column& column, int kept, int count, std::vector<float>* values);
+  absl::Status FillFlags(const Hdf5Column& column, int kept, int count, std::vector<std::uint8_t>* flags);
+
+  const FlatColumns columns_;
+  const bool flags_only_;
+  std::int64_t next_row_ = 0;  // of the file, to be read next
+  int rows_ = 0;               // in the window
+  std::vector<float> observations_, actions_, rewards_, next_observations_;
+  std::vector<std::uint8_t> terminals_, timeouts_, bad_;
+  BadRows bad_rows_;
+};
+
+}  // namespace dbr

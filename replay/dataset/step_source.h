@@ -1,0 +1,66 @@
+// The steps of a file, whatever its layout: what the readers of the layouts give to the reader of
+// transitions.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "absl/status/statusor.h"
+#include "absl/types/span.h"
+#include "replay/dataset/hdf5_file.h"
+
+namespace dbr {
+
+enum class StepEnd : std::uint8_t { kNone, kTerminal, kCut };
+
+// One step of an episode. Pointers are null where only the flags are read, and `next_observation` also where
+// there is none.
+struct Step {
+  const float* observation = nullptr;
+  const float* action = nullptr;
+  const float* next_observation = nullptr;
+  float reward = 0;
+  StepEnd end = StepEnd::kNone;
+  bool has_next = false;  // it is a transition
+  bool bad = false;       // a row that it takes values from has one that is not finite
+  // The next step ends the episode without being a transition: this one is the episode's last transition.
+  bool last_transition = false;
+  float following_reward = 0;  // the next step's, where last_transition
+};
+
+// Rows with values that are not finite, among those read so far.
+struct BadRows {
+  std::int64_t count = 0;
+  std::int64_t first = -1;
+};
+
+struct StepSourceOptions {
+  int max_episode_steps = 0;
+  bool flags_only = false;  // reads neither observations nor actions nor rewards
+};
+
+// A stream of steps. Thread-compatible.
+class StepSource {
+ public:
+  virtual ~StepSource() = default;
+
+  // Rows of the file, and the widths of its arrays.
+  virtual std::int64_t rows() const = 0;
+  virtual int observation_size() const = 0;
+  virtual int action_width() const = 0;
+
+  // The next steps, at least one; none at the end. Valid until the next call.
+  virtual absl::StatusOr<absl::Span<const Step>> NextSteps() = 0;
+
+  virtual BadRows bad_rows() const = 0;
+};
+
+// Each checks keys, shapes and lengths of the file, which has to outlive the source.
+absl::StatusOr<std::unique_ptr<StepSource>> OpenD4rlSteps(const Hdf5File& file,
+                                                          const StepSourceOptions& options);
+absl::StatusOr<std::unique_ptr<StepSource>> OpenPybulletSteps(const Hdf5File& file,
+                                                              const StepSourceOptions& options);
+absl::StatusOr<std::unique_ptr<StepSource>> OpenMinariSteps(const Hdf5File& file,
+                                                            const StepSourceOptions& options);
+
+}  // namespace dbr
