@@ -7,8 +7,11 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "envs/bullet/ant.h"
+#include "envs/bullet/half_cheetah.h"
 #include "envs/bullet/hopper.h"
 #include "envs/bullet/locomotion.h"
+#include "envs/bullet/walker2d.h"
 #include "envs/connect4/env.h"
 #include "envs/env.h"
 
@@ -21,20 +24,26 @@ struct Entry {
   std::string name;
   std::vector<std::string> aliases;
   std::vector<std::string> evaluation_opponents;  // empty: a game of one, which takes no opponents
-  Made (*make)(const std::vector<std::string>& opponents);
+  Made (*make)(absl::string_view name, const std::vector<std::string>& opponents);
 };
 
-Made MakeHopper(const std::vector<std::string>&) {
-  return std::make_unique<bullet::LocomotionEnv>("hopper", bullet::HopperPlan());
+// An environment of the robot that `plan` makes; robots take no opponents.
+template <bullet::RobotPlan (*plan)()>
+Made MakeRobot(absl::string_view name, const std::vector<std::string>&) {
+  return std::make_unique<bullet::LocomotionEnv>(std::string(name), plan());
+}
+
+Made MakeConnect4(absl::string_view, const std::vector<std::string>& opponents) {
+  return connect4::Connect4Env::Make(opponents);
 }
 
 const std::vector<Entry>& Entries() {
   static const auto* const entries = new std::vector<Entry>{
-      {"connect4",
-       {"connect_four"},
-       {"random", "one_ply", "mcts:10", "mcts:100"},
-       connect4::Connect4Env::Make},
-      {"hopper", {"HopperBulletEnv-v0"}, {}, MakeHopper},
+      {"ant", {"AntBulletEnv-v0"}, {}, MakeRobot<bullet::AntPlan>},
+      {"connect4", {"connect_four"}, {"random", "one_ply", "mcts:10", "mcts:100"}, MakeConnect4},
+      {"half_cheetah", {"HalfCheetahBulletEnv-v0"}, {}, MakeRobot<bullet::HalfCheetahPlan>},
+      {"hopper", {"HopperBulletEnv-v0"}, {}, MakeRobot<bullet::HopperPlan>},
+      {"walker2d", {"Walker2DBulletEnv-v0"}, {}, MakeRobot<bullet::Walker2dPlan>},
   };
   return *entries;
 }
@@ -59,7 +68,7 @@ absl::StatusOr<std::unique_ptr<Env>> MakeEnv(const EnvOptions& options) {
                                                    absl::StrJoin(options.opponents, "\", \""),
                                                    "\"; leave the list of opponents empty"));
   }
-  return entry->make(options.opponents);
+  return entry->make(entry->name, options.opponents);
 }
 
 std::vector<std::string> EnvNames() {

@@ -30,7 +30,7 @@ void EnvStep(benchmark::State& state, const std::string& name) {
 }
 
 [[maybe_unused]] const bool kRegistered = [] {
-  for (const char* name : {"hopper"}) {
+  for (const char* name : {"hopper", "walker2d", "half_cheetah", "ant"}) {
     benchmark::RegisterBenchmark((std::string("EnvStep/") + name).c_str(),
                                  [name = std::string(name)](benchmark::State& state) { EnvStep(state, name); });
   }

@@ -5,9 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "envs/bullet/ant.h"
+#include "envs/bullet/half_cheetah.h"
 #include "envs/bullet/hopper.h"
 #include "envs/bullet/locomotion_task.h"
 #include "envs/bullet/multibody.h"
+#include "envs/bullet/walker2d.h"
 #include "gtest/gtest.h"
 #include "tests/reference_json.h"
 
@@ -17,7 +20,10 @@ namespace {
 using Json = nlohmann::json;
 
 RobotPlan PlanOf(const std::string& env) {
+  if (env == "AntBulletEnv-v0") return AntPlan();
+  if (env == "HalfCheetahBulletEnv-v0") return HalfCheetahPlan();
   if (env == "HopperBulletEnv-v0") return HopperPlan();
+  if (env == "Walker2DBulletEnv-v0") return Walker2dPlan();
   return {};
 }
 
