@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "replay/seed_record.h"
 #include "replay/transition_store.h"
 #include "replay/writer_table.h"
 
@@ -38,8 +39,12 @@ struct BufferStats {
   std::uint64_t total = 0, plus = 0, minus = 0, unjudged = 0;
   std::uint64_t seed = 0, seed_plus = 0, seed_minus = 0;
   std::uint64_t capacity = 0, bytes = 0;
-  std::uint64_t inserted = 0, evicted = 0;
+  std::uint64_t inserted = 0;  // without the seed
+  std::uint64_t evicted = 0;
+  std::uint64_t seed_rows = 0;  // that ever came in
+  SeedRecord seed_record{};
   StoreCounters counters{};
+  double samples_per_insert = 0;  // over the life of the buffer; the seed, and draws from it alone, apart
   double insert_rate = 0, sample_rate = 0, relabel_rate = 0;  // a second, over the last seconds
   LabelSummary labels;  // of at most PartitionedBuffer::kLabelsLookedAt rows, evenly spread over the buffer
   std::vector<WriterSummary> writers;

@@ -47,8 +47,8 @@ absl::StatusOr<std::unique_ptr<PartitionedBuffer>> PartitionedBuffer::Make(
   ASSIGN_OR_RETURN(const RateLimiter limiter, RateLimiter::Make(options.limiter, store->capacity()));
   ASSIGN_OR_RETURN(Partitions partitions,
                    Partitions::Make(options.selector, static_cast<std::uint32_t>(store->capacity())));
-  for (std::uint64_t key = store->oldest_key(); key < store->next_key(); ++key) {
-    const std::uint32_t slot = store->SlotOf(key);
+  for (std::uint64_t rank = 0; rank < store->size(); ++rank) {
+    const std::uint32_t slot = store->SlotOf(store->KeyAtRank(rank));
     partitions.Add(slot, store->labels(slot).advantage, store->labels(slot).source);
   }
   return std::unique_ptr<PartitionedBuffer>(
@@ -60,6 +60,7 @@ PartitionedBuffer::PartitionedBuffer(std::unique_ptr<TransitionStore> store, con
     : layout_(store->layout()),
       capacity_(store->capacity()),
       cumulative_advantage_(options.cumulative_advantage),
+      seed_share_(options.seed_share),
       now_(options.now),
       start_(options.now()),
       store_(std::move(store)),
@@ -140,6 +141,7 @@ absl::Status PartitionedBuffer::Insert(std::uint32_t place, InsertBatch* batch, 
                               [](const RowEnd& e, int row) { return e.row < row; });
   while (batch->next_row < batch->columns.count) {
     absl::MutexLock lock(&mutex_);
+    RETURN_IF_ERROR(CheckHasPlace());
     const std::uint64_t inserted_before = store_->inserted();
     for (int rows = 0; rows < kRowsPerLock && SkipRows(place, refused, batch); ++rows) {
       if (rows > 0 && !CanInsert()) break;
@@ -155,8 +157,7 @@ absl::Status PartitionedBuffer::Insert(std::uint32_t place, InsertBatch* batch, 
 }
 
 void PartitionedBuffer::DrawPart(int part, std::uint32_t count, const DrawColumns& out) {
-  drawn_slots_.resize(count);
-  for (auto& slot : drawn_slots_) slot = partitions_[part].Draw(&rng_);
+  ChooseSlots(part, count);
   const std::size_t observation = layout_.observation_width, action = layout_.action_width,
                     mask = layout_.mask_width;
   const auto copy = [](const float* from, std::size_t width, std::size_t i, float* to) {
@@ -194,12 +195,13 @@ absl::Status PartitionedBuffer::Draw(const DrawRequest& request, const DrawBuffe
     drawn += result->drawn[part];
   }
   store_->counters().sampled += drawn;
+  if (store_->online_inserted() == 0) store_->counters().sampled_offline += drawn;
   draws_.Add(now_(), drawn);
   result->total = partitions_.size(kUniform);
   result->plus = partitions_.size(kPlus);
   result->minus = partitions_.size(kMinus);
   result->unjudged = partitions_.size(kUnjudgedPart);
-  result->inserted = store_->inserted();
+  result->inserted = store_->online_inserted();
   result->episodes = store_->counters().episodes;
   return absl::OkStatus();
 }

@@ -34,9 +34,14 @@ void PartitionedBuffer::AddCounts(BufferStats* stats) const {
   stats->seed_plus = partitions_.seed(kPlus);
   stats->seed_minus = partitions_.seed(kMinus);
   stats->bytes = store_->bytes();
-  stats->inserted = store_->inserted();
+  stats->inserted = store_->online_inserted();
   stats->evicted = store_->inserted() - store_->size();
   stats->counters = store_->counters();
+  stats->seed_rows = store_->seed_rows();
+  stats->seed_record = store_->seed();
+  const RateLimiter::Counts counts = Counts();
+  if (counts.inserted > 0)
+    stats->samples_per_insert = static_cast<double>(counts.sampled) / static_cast<double>(counts.inserted);
 }
 
 void PartitionedBuffer::AddWriters(BufferStats* stats) const {
@@ -73,20 +78,18 @@ LabelSummary PartitionedBuffer::LookAtLabels() const {
   constexpr std::uint64_t kRowsPerLook = 1000;
   std::vector<float> advantages;
   std::vector<std::uint64_t> ages;
-  std::uint64_t key, end, step;
+  std::uint64_t rows, step;
   {
     absl::MutexLock lock(&mutex_);
-    key = store_->oldest_key();
-    end = store_->next_key();
-    step = std::max<std::uint64_t>(1, (store_->size() + kLabelsLookedAt - 1) / kLabelsLookedAt);
+    rows = store_->size();
+    step = std::max<std::uint64_t>(1, (rows + kLabelsLookedAt - 1) / kLabelsLookedAt);
   }
-  advantages.reserve((end - key) / step + 1);
-  ages.reserve((end - key) / step + 1);
-  while (key < end) {
+  advantages.reserve(rows / step + 1);
+  ages.reserve(rows / step + 1);
+  for (std::uint64_t rank = 0; rank < rows;) {
     absl::MutexLock lock(&mutex_);
-    for (std::uint64_t looked = 0; looked < kRowsPerLook && key < end; ++looked, key += step) {
-      if (!store_->Holds(key)) continue;
-      const RowLabels& labels = store_->labels(store_->SlotOf(key));
+    for (std::uint64_t looked = 0; looked < kRowsPerLook && rank < rows; ++looked, rank += step) {
+      const RowLabels& labels = store_->labels(store_->SlotOf(store_->KeyAtRank(rank)));
       if (std::isnan(labels.advantage)) continue;
       advantages.push_back(labels.advantage);
       ages.push_back(store_->counters().newest_label -

@@ -12,7 +12,11 @@ absl::Status Stopping() {
 }  // namespace
 
 RateLimiter::Counts PartitionedBuffer::Counts() const {
-  return {store_->inserted(), store_->counters().sampled, store_->size()};
+  const StoreCounters& counters = store_->counters();
+  return {.inserted = store_->online_inserted(),
+          .sampled = counters.sampled - counters.sampled_offline,
+          .size = store_->size(),
+          .seed = store_->seed_rows()};
 }
 
 // A draw that waits for an empty partition can only be helped by an insert or a relabel, and who draws may be

@@ -1,5 +1,6 @@
 #include "replay/rate_limiter.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "absl/strings/str_cat.h"
@@ -27,8 +28,12 @@ absl::StatusOr<RateLimiter> RateLimiter::Make(const RateLimiterOptions& options,
   return RateLimiter(options);
 }
 
+std::uint64_t RateLimiter::Minimum(const Counts& counts) const {
+  return options_.min_size - std::min(options_.min_size, counts.seed);
+}
+
 double RateLimiter::Lead(const Counts& counts) const {
-  const double after_minimum = static_cast<double>(counts.inserted) - static_cast<double>(options_.min_size);
+  const double after_minimum = static_cast<double>(counts.inserted) - static_cast<double>(Minimum(counts));
   return options_.samples_per_insert * after_minimum - static_cast<double>(counts.sampled);
 }
 
@@ -39,7 +44,7 @@ bool RateLimiter::CanInsert(const Counts& counts) const {
 
 bool RateLimiter::CanDraw(const Counts& counts, std::uint64_t n) const {
   if (counts.size < options_.min_size) return false;
-  if (options_.samples_per_insert == 0) return true;
+  if (options_.samples_per_insert == 0 || Offline(counts)) return true;
   return static_cast<double>(n) - Lead(counts) <= options_.tolerance;
 }
 
@@ -52,13 +57,14 @@ bool RateLimiter::MakeRoomFor(std::uint64_t n) {
 std::string RateLimiter::Describe(const Counts& counts) const {
   return absl::StrCat("rate limiter (samples_per_insert ", options_.samples_per_insert, ", tolerance ",
                       options_.tolerance, ", min_size ", options_.min_size, ") with inserted ",
-                      counts.inserted, ", sampled ", counts.sampled, ", size ", counts.size);
+                      counts.inserted, ", sampled ", counts.sampled, ", size ", counts.size,
+                      counts.seed > 0 ? absl::StrCat(", seed ", counts.seed, " (counted apart)") : "");
 }
 
 std::string RateLimiter::WhyInsertWaits(const Counts& counts) const {
-  return absl::StrCat(Describe(counts),
-                      ": inserts wait while samples_per_insert * (inserted - min_size) - sampled = ",
-                      Lead(counts), " is above the tolerance; they go on when more is drawn");
+  return absl::StrCat(Describe(counts), ": inserts wait while samples_per_insert * (inserted - ",
+                      Minimum(counts), ") - sampled = ", Lead(counts),
+                      " is above the tolerance; they go on when more is drawn");
 }
 
 std::string RateLimiter::WhyDrawWaits(const Counts& counts, std::uint64_t n) const {
@@ -66,10 +72,10 @@ std::string RateLimiter::WhyDrawWaits(const Counts& counts, std::uint64_t n) con
     return absl::StrCat(Describe(counts), ": draws wait for min_size; ", options_.min_size - counts.size,
                         " more transitions are needed");
   }
-  return absl::StrCat(
-      Describe(counts), ": a draw of ", n, " waits while sampled + ", n,
-      " - samples_per_insert * (inserted - min_size) = ", static_cast<double>(n) - Lead(counts),
-      " is above the tolerance; it goes on when more is inserted");
+  return absl::StrCat(Describe(counts), ": a draw of ", n, " waits while sampled + ", n,
+                      " - samples_per_insert * (inserted - ", Minimum(counts),
+                      ") = ", static_cast<double>(n) - Lead(counts),
+                      " is above the tolerance; it goes on when more is inserted");
 }
 
 }  // namespace dbr

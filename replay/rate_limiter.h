@@ -14,21 +14,25 @@ struct RateLimiterOptions {
   std::uint64_t min_size = 1;     // nothing is drawn before the buffer holds this many
 };
 
-// With `lead` = samples_per_insert * (inserted - min_size) - sampled:
+// With `lead` = samples_per_insert * (inserted - minimum) - sampled:
 //   an insert waits while    lead > tolerance              (and the buffer has its minimum size),
 //   a draw of n waits while  lead < n - tolerance          (or the buffer has not its minimum size).
 // Both would wait for ever where tolerance < lead < n - tolerance, which needs n > 2 * tolerance: so a draw
 // larger than that raises the tolerance to n / 2 for good, before it waits. Then one of the two can always go
 // on.
 //
+// A seed counts as neither inserted nor sampled: `minimum` is min_size less the seed's rows, at least 0, and
+// as long as there is nothing but seed draws are free and are not counted.
+//
 // Plain arithmetic without clock or lock; the buffer's lock guards it.
 class RateLimiter {
  public:
   // The state that it judges by, over the life of the buffer.
   struct Counts {
-    std::uint64_t inserted = 0;
-    std::uint64_t sampled = 0;
-    std::uint64_t size = 0;
+    std::uint64_t inserted = 0;  // without the seed
+    std::uint64_t sampled = 0;   // since the first of these
+    std::uint64_t size = 0;      // all that is held
+    std::uint64_t seed = 0;      // rows that the buffer was begun with
   };
 
   // InvalidArgument for negative or non-finite numbers and for a minimum size of 0 or above `capacity`.
@@ -49,6 +53,8 @@ class RateLimiter {
  private:
   explicit RateLimiter(const RateLimiterOptions& options) : options_(options) {}
 
+  bool Offline(const Counts& counts) const { return counts.seed > 0 && counts.inserted == 0; }
+  std::uint64_t Minimum(const Counts& counts) const;
   double Lead(const Counts& counts) const;
   std::string Describe(const Counts& counts) const;
 

@@ -1,5 +1,7 @@
 #include "replay/service_codec.h"
 
+#include <cmath>
+
 #include "absl/strings/str_cat.h"
 #include "core/status_macros.h"
 #include "proto/codec.h"
@@ -67,6 +69,20 @@ void EncodeCounts(const BufferStats& stats, StatsReply* reply) {
   reply->set_refused(stats.counters.refused);
   reply->set_duplicates(stats.counters.duplicates);
   reply->set_episodes(stats.counters.episodes);
+  reply->set_sampled_offline(stats.counters.sampled_offline);
+}
+
+void EncodeSeed(const BufferStats& stats, StatsReply* reply) {
+  const SeedRecord& record = stats.seed_record;
+  const auto number = [&record](double value) { return record.complete != 0 ? value : std::nan(""); };
+  reply->set_seed_rows(stats.seed_rows);
+  reply->set_seed_bad_rows(record.bad_rows);
+  reply->set_seed_episodes(record.episodes);
+  reply->set_seed_return_mean(number(record.return_mean));
+  reply->set_seed_return_std(number(record.return_std));
+  reply->set_seed_return_min(number(record.return_min));
+  reply->set_seed_return_max(number(record.return_max));
+  reply->set_seed_rows_per_second(record.rows_per_second);
 }
 
 }  // namespace
@@ -74,16 +90,10 @@ void EncodeCounts(const BufferStats& stats, StatsReply* reply) {
 absl::StatusOr<WriterIdentity> DecodeOpening(const InsertRequest& request) {
   if (request.has_transitions()) {
     return absl::InvalidArgumentError(
-        "the first message of a stream: expected a writer's name, id and source and no transitions, found "
+        "the first message of a stream: expected a writer's name and id and no transitions, found "
         "transitions");
   }
-  if (request.source() != ONLINE && request.source() != SEED) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("source: expected ONLINE (0) or SEED (1), found ", static_cast<int>(request.source())));
-  }
-  return WriterIdentity{.id = request.writer_id(),
-                        .name = request.writer_name(),
-                        .source = request.source() == SEED ? Source::kSeed : Source::kOnline};
+  return WriterIdentity{.id = request.writer_id(), .name = request.writer_name()};
 }
 
 absl::StatusOr<InsertBatch> DecodeInsert(const InsertRequest& request, const TransitionLayout& layout,
@@ -161,12 +171,11 @@ void Encode(const RelabelResult& result, RelabelReply* reply) {
 
 void Encode(const BufferStats& stats, StatsReply* reply) {
   EncodeCounts(stats, reply);
+  EncodeSeed(stats, reply);
   reply->set_insert_rate(stats.insert_rate);
   reply->set_sample_rate(stats.sample_rate);
   reply->set_relabel_rate(stats.relabel_rate);
-  reply->set_samples_per_insert(stats.inserted == 0 ? 0
-                                                    : static_cast<double>(stats.counters.sampled) /
-                                                          static_cast<double>(stats.inserted));
+  reply->set_samples_per_insert(stats.samples_per_insert);
   reply->set_newest_critic_version(stats.counters.newest_label);
   reply->set_label_age_mean(stats.labels.age_mean);
   reply->set_label_age_p95(stats.labels.age_p95);

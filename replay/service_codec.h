@@ -12,7 +12,7 @@
 
 namespace dbr {
 
-// The opening message of a stream. InvalidArgument where it carries transitions or an unknown source.
+// The opening message of a stream. InvalidArgument where it carries transitions.
 absl::StatusOr<WriterIdentity> DecodeOpening(const InsertRequest& request);
 
 // Views into `request`, with its ends copied to `ends`. InvalidArgument where the batch has not the layout.

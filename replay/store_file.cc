@@ -20,7 +20,7 @@ namespace dbr {
 namespace {
 
 constexpr char kMagic[8] = {'D', 'B', 'R', 'S', 'T', 'O', 'R', 'E'};
-constexpr std::uint32_t kFormat = 1;
+constexpr std::uint32_t kFormat = 2;
 
 struct Header {
   char magic[8];

@@ -64,7 +64,8 @@ absl::StatusOr<std::uint64_t> RowsFor(const StoreOptions& options, std::uint64_t
 }  // namespace
 
 std::size_t TransitionStore::ContentBytes(std::uint64_t capacity, int stride) {
-  return Aligned(sizeof(StoreCounters)) + Aligned(kRecentEpisodes * sizeof(EpisodeEnd)) +
+  return Aligned(sizeof(StoreCounters)) + Aligned(sizeof(SeedRecord)) +
+         Aligned(kRecentEpisodes * sizeof(EpisodeEnd)) +
          Aligned(WriterTable::kPlaces * sizeof(WriterRecord)) + Aligned(capacity * sizeof(Meta)) +
          Aligned(capacity * static_cast<std::size_t>(stride) * sizeof(float));
 }
@@ -78,7 +79,7 @@ absl::StatusOr<std::unique_ptr<TransitionStore>> TransitionStore::Open(const Sto
                          StoreFile::kHeaderBytes + ContentBytes(capacity, stride)};
   ASSIGN_OR_RETURN(auto file, StoreFile::Open(options.path, shape, options.resume));
   std::unique_ptr<TransitionStore> store(new TransitionStore(options.layout, capacity, std::move(file)));
-  if (options.resume && !options.path.empty()) store->Recover();
+  if (options.resume && !options.path.empty()) RETURN_IF_ERROR(store->Recover());
   return store;
 }
 
@@ -88,12 +89,14 @@ TransitionStore::TransitionStore(const TransitionLayout& layout, std::uint64_t c
       stride_(layout.stride()),
       capacity_(capacity),
       bytes_(ContentBytes(capacity, layout.stride()) + capacity * kIndexBytes),
-      file_(std::move(file)) {
+      file_(std::move(file)),
+      ring_(capacity) {
   std::byte* section = file_->contents();
   const auto take = [&section](std::size_t bytes) {
     return std::exchange(section, section + Aligned(bytes));
   };
   counters_ = reinterpret_cast<StoreCounters*>(take(sizeof(StoreCounters)));
+  seed_ = reinterpret_cast<SeedRecord*>(take(sizeof(SeedRecord)));
   episodes_ = reinterpret_cast<EpisodeEnd*>(take(kRecentEpisodes * sizeof(EpisodeEnd)));
   writers_ = std::make_unique<WriterTable>(
       reinterpret_cast<WriterRecord*>(take(WriterTable::kPlaces * sizeof(WriterRecord))));
@@ -108,8 +111,21 @@ bool TransitionStore::LooksWhole(std::uint64_t key) const {
          writers_->record(meta.labels.writer).id != 0 && !std::isinf(meta.labels.advantage);
 }
 
-void TransitionStore::Recover() {
-  std::uint64_t newest = 0;
+void TransitionStore::Pin(std::uint64_t rows) {
+  pinned_ = rows;
+  ring_ = std::max<std::uint64_t>(1, capacity_ - rows);
+}
+
+absl::Status TransitionStore::Recover() {
+  if (seed_->complete != 0) {
+    if (seed_->complete != 1 || seed_->pinned > capacity_ || seed_->pinned > seed_->rows) {
+      return absl::DataLossError(absl::StrCat("replay store: its record of the seed is damaged (rows ",
+                                              seed_->rows, ", pinned ", seed_->pinned, ", capacity ",
+                                              capacity_, "). Start a new run."));
+    }
+    Pin(seed_->pinned);
+  }
+  std::uint64_t newest = pinned_;
   std::uint64_t keys = 0;
   for (std::uint32_t slot = 0; slot < capacity_; ++slot) {
     const std::uint64_t key = metas_[slot].key;
@@ -117,41 +133,76 @@ void TransitionStore::Recover() {
     ++keys;
     if (key != kBeingWritten && SlotOf(key) == slot && LooksWhole(key)) newest = std::max(newest, key);
   }
+  for (std::uint64_t key = 1; key <= pinned_; ++key) {
+    if (!LooksWhole(key))
+      return absl::DataLossError(
+          absl::StrCat("replay store: row ", key, " of its seed is damaged. Start a new run."));
+  }
   next_key_ = newest + 1;
-  while (size_ < std::min(capacity_, newest) && LooksWhole(newest - size_)) ++size_;
-  torn_ = keys - size_;
-  for (std::uint64_t key = oldest_key(); key < next_key_; ++key) {
-    const RowLabels& labels = metas_[SlotOf(key)].labels;
+  while (ring_size_ < std::min(capacity_ - pinned_, newest - pinned_) && LooksWhole(newest - ring_size_))
+    ++ring_size_;
+  torn_ = keys - size();
+  if (seed_->complete != 0) {
+    seed_rows_ = std::min(seed_->rows, inserted());
+  } else if (size() > 0 && metas_[SlotOf(oldest_key())].labels.source == Source::kSeed) {
+    seed_rows_ = inserted();  // the process was killed before it had all
+  }
+  for (std::uint64_t rank = 0; rank < size(); ++rank) {
+    const RowLabels& labels = metas_[SlotOf(KeyAtRank(rank))].labels;
     writers_->AddHeld(labels.writer, 1);
     WriterRecord& writer = writers_->record(labels.writer);
     writer.last_sequence = std::max(writer.last_sequence, labels.sequence);
   }
+  return absl::OkStatus();
 }
 
-std::uint32_t TransitionStore::Append(const TransitionView& transition, const RowLabels& labels) {
-  DBR_CHECK(size_ < capacity_);
+template <class Fill>
+std::uint32_t TransitionStore::Write(const RowLabels& labels, const Fill& fill) {
+  DBR_CHECK(size() < capacity_);
   const std::uint32_t slot = SlotOf(next_key_);
   Meta& meta = metas_[slot];
   std::atomic_ref<std::uint64_t> commit(meta.key);
   commit.exchange(kBeingWritten, std::memory_order_acq_rel);
-  float* out = rows_ + std::size_t{slot} * stride_;
-  out = CopyTo(out, transition.observation);
-  out = CopyTo(out, transition.action);
-  out = CopyTo(out, transition.mask);
-  *out++ = transition.reward;
-  *out++ = transition.discount;
-  out = CopyTo(out, transition.next_observation);
-  CopyTo(out, transition.next_mask);
+  fill(rows_ + std::size_t{slot} * stride_);
   meta.labels = labels;
   commit.store(next_key_, std::memory_order_release);
   ++next_key_;
-  ++size_;
+  ++ring_size_;
   return slot;
 }
 
+std::uint32_t TransitionStore::Append(const TransitionView& transition, const RowLabels& labels) {
+  return Write(labels, [&transition](float* out) {
+    out = CopyTo(out, transition.observation);
+    out = CopyTo(out, transition.action);
+    out = CopyTo(out, transition.mask);
+    *out++ = transition.reward;
+    *out++ = transition.discount;
+    out = CopyTo(out, transition.next_observation);
+    CopyTo(out, transition.next_mask);
+  });
+}
+
+std::uint32_t TransitionStore::AppendSeed(const float* row, const RowLabels& labels) {
+  DBR_CHECK(seed_->complete == 0 && online_inserted() == 0);
+  ++seed_rows_;
+  return Write(labels, [row, this](float* out) { std::memcpy(out, row, stride_ * sizeof(float)); });
+}
+
+void TransitionStore::CompleteSeed(SeedRecord record, bool pin) {
+  DBR_CHECK(seed_->complete == 0 && online_inserted() == 0);
+  record.complete = 0;
+  record.rows = seed_rows_;
+  record.pinned = pin ? seed_rows_ : 0;
+  *seed_ = record;
+  std::atomic_ref<std::uint64_t>(seed_->complete).store(1, std::memory_order_release);
+  Pin(record.pinned);
+  ring_size_ -= record.pinned;
+}
+
 void TransitionStore::Evict() {
-  DBR_CHECK(size_ > 0);
-  --size_;
+  DBR_CHECK(CanEvict());
+  --ring_size_;
 }
 
 void TransitionStore::SetAdvantage(std::uint32_t slot, float advantage, std::uint64_t critic_version) {

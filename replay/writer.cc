@@ -160,7 +160,6 @@ class TransitionWriter::Impl {
     InsertRequest opening;
     opening.set_writer_name(options_.name);
     opening.set_writer_id(id_);
-    opening.set_source(options_.source);
     InsertReply reply;
     if (!stream->Write(opening) || !stream->Read(&reply)) return false;
     std::uint64_t resend;

@@ -9,14 +9,12 @@
 #include "absl/status/status.h"
 #include "absl/time/time.h"
 #include "core/transition.h"
-#include "proto/replay.pb.h"
 
 namespace dbr {
 
 struct WriterOptions {
   std::string address;
   std::string name;  // for people: "actor-0"
-  TransitionSource source = ONLINE;
   TransitionLayout layout;
   std::size_t batch_bytes = 32 << 10;                      // of one message
   int window = 16;                                         // unacknowledged messages under way

@@ -83,7 +83,6 @@ TEST_F(BadInput, OpeningsThatMakeNoSenseAreRefusedByName) {
       {"writer_name", [](InsertRequest* m) { m->set_writer_name(""); }},
       {"writer_name", [](InsertRequest* m) { m->set_writer_name(std::string(1000, 'x')); }},
       {"writer_id", [](InsertRequest* m) { m->set_writer_id(0); }},
-      {"source", [](InsertRequest* m) { m->set_source(static_cast<TransitionSource>(17)); }},
       {"first message", [this](InsertRequest* m) { *m->mutable_transitions() = good_.transitions(); }},
   };
   for (const auto& bad : cases) {

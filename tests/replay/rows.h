@@ -38,6 +38,16 @@ class Rows {
             .critic_versions = critic_versions.data()};
   }
 
+  // Row i as it lies in a store.
+  void AppendFlat(int i, std::vector<float>* flat) const {
+    const TransitionView row = columns().Row(layout_, i);
+    for (const auto& part : {row.observation, row.action, row.mask})
+      flat->insert(flat->end(), part.begin(), part.end());
+    flat->insert(flat->end(), {row.reward, row.discount});
+    for (const auto& part : {row.next_observation, row.next_mask})
+      flat->insert(flat->end(), part.begin(), part.end());
+  }
+
   std::vector<float> observations, actions, masks, rewards, discounts, next_observations, next_masks,
       advantages;
   std::vector<std::uint64_t> critic_versions;
