@@ -16,11 +16,11 @@
 namespace dbr {
 
 struct DatasetOptions {
-  std::optional<DatasetLayout> layout;  // empty: as the file's own attribute `layout` says
-  std::string env;                      // whose data is expected, for messages; empty: any
-  int observation_size = 0;             // expected; 0: any
-  int action_width = 0;                 // expected; 0: any
-  float discount = 0.99f;               // of a transition after which the task goes on
+  std::optional<DatasetLayout> layout = std::nullopt;  // empty: as the file's own attribute `layout` says
+  std::string env = "";                                // whose data is expected, for messages; empty: any
+  int observation_size = 0;                            // expected; 0: any
+  int action_width = 0;                                // expected; 0: any
+  float discount = 0.99f;                              // of a transition after which the task goes on
   // d4rl_pybullet and d4rl without `timeouts`: an episode of that many steps is cut, not terminal. 0: as the
   // file's own attribute `max_episode_steps` says, else 1,000.
   int max_episode_steps = 0;
