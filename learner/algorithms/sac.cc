@@ -79,9 +79,9 @@ Scalar Sac<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
   FillNormal(rng_, spec_.actions.size, n, &noise_);
   draws_.Draw(head_, noise_);
   critics_.Evaluate(draws_.CriticInput(batch.observations));
-  SmallerMeanQTerm<Scalar>({}, critics_.q1(), critics_.q2(), n, &q_term_);
+  SmallerMeanQTerm<Scalar>({}, critics_.value1(), critics_.value2(), n, &q_term_);
   value_.resize(n);
-  MeanOfSmaller<Scalar>(critics_.q1(), critics_.q2(), &value_);
+  MeanOfSmaller<Scalar>(critics_.value1(), critics_.value2(), &value_);
 
   d_log_prob_.setConstant(n, temperature / static_cast<Scalar>(n));
   gradient_.mean.setZero(spec_.actions.size, n);

@@ -26,8 +26,8 @@ void DualBehaviorObjective<Scalar>::AddQTerm(const PolicyLossOptions& options,
                                              PolicyLoss<Scalar>* result) {
   samples_.Draw(heads.pi, noise.actions);
   critics->Evaluate(samples_.CriticInput(observations));
-  SmallerMeanQTerm<Scalar>({.use_q = options.use_q, .normalize = options.normalize_q}, critics->q1(),
-                           critics->q2(), observations.cols(), &q_term_);
+  SmallerMeanQTerm<Scalar>({.use_q = options.use_q, .normalize = options.normalize_q}, critics->value1(),
+                           critics->value2(), observations.cols(), &q_term_);
   const VectorX<Scalar>& log_prob = samples_.sample().log_prob;
   const auto entropy_weight = static_cast<Scalar>(options.entropy_weight);
   d_log_prob_.setConstant(log_prob.size(), entropy_weight / static_cast<Scalar>(log_prob.size()));

@@ -38,7 +38,7 @@ class DualBehaviorObjective {
 
   // V(s) [n]: the mean over the draws of the smaller twin.
   void StateValue(const TwinCritic<Scalar>& critics, VectorX<Scalar>* value) const {
-    MeanOfSmaller<Scalar>(critics.q1(), critics.q2(), value);
+    MeanOfSmaller<Scalar>(critics.value1(), critics.value2(), value);
   }
 
  private:

@@ -42,10 +42,13 @@ class TrainedNetwork {
   const MatrixX<Scalar>& ForwardTarget(const ConstMatrixRef<Scalar>& x) {
     return MlpForward(shape_, target_.data(), x, &target_activations_);
   }
-  // The gradient with respect to the x [input x n] of the newest Forward; the parameters' gradient is not
-  // touched.
+  // [output x n] of the online network for InputGradient; leaves what Forward keeps alone.
+  const MatrixX<Scalar>& ForwardForInput(const ConstMatrixRef<Scalar>& x) {
+    return MlpForward(shape_, parameters_.data(), x, &input_activations_);
+  }
+  // The gradient with respect to the x [input x n] of the newest ForwardForInput.
   void InputGradient(const ConstMatrixRef<Scalar>& d_output, MatrixX<Scalar>* d_x) {
-    MlpInputGradient(shape_, parameters_.data(), d_output, &activations_, d_x);
+    MlpInputGradient(shape_, parameters_.data(), d_output, &input_activations_, d_x);
   }
   // The gradient for the newest Forward(x) from the loss's gradient with respect to its output.
   void ComputeGradient(const ConstMatrixRef<Scalar>& x, const ConstMatrixRef<Scalar>& d_output) {
@@ -91,6 +94,7 @@ class TrainedNetwork {
   VectorX<Scalar> gradient_;
   MlpActivations<Scalar> activations_;
   MlpActivations<Scalar> target_activations_;
+  MlpActivations<Scalar> input_activations_;
 };
 
 }  // namespace dbr

@@ -45,11 +45,13 @@ class TwinCritic {
   const MatrixX<Scalar>& q1() const { return first_.q; }
   const MatrixX<Scalar>& q2() const { return second_.q; }
 
-  // Evaluates the critics as they are: q1(), q2().
+  // Evaluates the critics as they are; their values are value1(), value2() until the next call.
   void Evaluate(const ConstMatrixRef<Scalar>& x) {
-    runner_->Run([&] { first_.q = first_.network.Forward(x); },
-                 [&] { second_.q = second_.network.Forward(x); });
+    runner_->Run([&] { first_.value = &first_.network.ForwardForInput(x); },
+                 [&] { second_.value = &second_.network.ForwardForInput(x); });
   }
+  const MatrixX<Scalar>& value1() const { return *first_.value; }
+  const MatrixX<Scalar>& value2() const { return *second_.value; }
   // The gradient of sum(d_q1 .* q1 + d_q2 .* q2) with respect to the x [input x n] of the newest Evaluate.
   const MatrixX<Scalar>& InputGradient(const ConstMatrixRef<Scalar>& d_q1,
                                        const ConstMatrixRef<Scalar>& d_q2) {
@@ -89,11 +91,12 @@ class TwinCritic {
  private:
   struct Critic {
     TrainedNetwork<Scalar> network;
-    MatrixX<Scalar> q;    // [outputs x n]
+    MatrixX<Scalar> q;    // [outputs x n] of the newest Fit, from before its step
     MatrixX<Scalar> d_q;  // [outputs x n]
     MatrixX<Scalar> d_x;  // [input x n]
     Scalar loss;
-    const MatrixX<Scalar>* target = nullptr;  // [outputs x n]
+    const MatrixX<Scalar>* target = nullptr;  // [outputs x n] of the newest EvaluateTargets
+    const MatrixX<Scalar>* value = nullptr;   // [outputs x n] of the newest Evaluate
   };
 
   const MlpShape& shape() const { return first_.network.shape(); }

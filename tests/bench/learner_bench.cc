@@ -9,30 +9,65 @@
 namespace dbr {
 namespace {
 
-// A batch of random boards with their legal actions; rewards at a tenth of the transitions.
+// Random boards with their legal actions for a discrete space, else random features and actions in the box;
+// rewards at a tenth of the transitions.
 void FillBatch(const AlgorithmSpec& spec, int n, Rng& rng, Batch* batch) {
   batch->Resize({spec.observation_size, spec.actions.width(), spec.actions.mask_width()}, n,
                 /*with_keys=*/false);
-  const auto bit = [&](float) { return rng.Below(4) == 0 ? 1.0f : 0.0f; };
-  batch->observations = batch->observations.unaryExpr(bit);
-  batch->next_observations = batch->next_observations.unaryExpr(bit);
+  const bool discrete = spec.actions.discrete();
+  const auto feature = [&](float) {
+    return discrete ? (rng.Below(4) == 0 ? 1.0f : 0.0f) : static_cast<float>(rng.Normal());
+  };
+  const auto action = [&](float) {
+    return discrete ? static_cast<float>(rng.Below(static_cast<std::uint32_t>(spec.actions.size)))
+                    : static_cast<float>(2 * rng.Uniform() - 1);
+  };
+  batch->observations = batch->observations.unaryExpr(feature);
+  batch->next_observations = batch->next_observations.unaryExpr(feature);
+  batch->actions = batch->actions.unaryExpr(action);
   batch->masks.setOnes();
   batch->next_masks.setOnes();
   for (int j = 0; j < n; ++j) {
-    batch->actions(0, j) = static_cast<float>(rng.Below(static_cast<std::uint32_t>(spec.actions.size)));
     batch->rewards[j] = rng.Below(10) == 0 ? 1.0f : 0.0f;
     batch->discounts[j] = batch->rewards[j] > 0 ? 0.0f : 0.99f;
   }
 }
 
-AlgorithmSpec Connect4Spec() {
+AlgorithmSpec SpecOf(const char* env, int observation_size, const ActionSpace& actions) {
   AlgorithmSpec spec;
-  spec.env = "connect4";
-  spec.observation_size = 84;
-  spec.actions = {ActionKind::kDiscrete, 7};
+  spec.env = env;
+  spec.observation_size = observation_size;
+  spec.actions = actions;
   spec.hidden_sizes = {256, 256, 256};
-  spec.config.mutable_dbr();
   spec.seed = 1;
+  return spec;
+}
+
+AlgorithmSpec Connect4() {
+  return SpecOf("connect4", 84, {ActionKind::kDiscrete, 7});
+}
+AlgorithmSpec Hopper() {
+  return SpecOf("hopper", 15, {ActionKind::kContinuous, 3});
+}
+AlgorithmSpec Ant() {
+  return SpecOf("ant", 28, {ActionKind::kContinuous, 8});
+}
+
+AlgorithmSpec Dbr(AlgorithmSpec spec) {
+  DbrConfig* dbr = spec.config.mutable_dbr();
+  if (!spec.actions.discrete()) dbr->set_divergence(DbrConfig::MMD_EXACT);
+  spec.config.set_threads(1);
+  return spec;
+}
+
+AlgorithmSpec Sac(AlgorithmSpec spec) {
+  spec.config.mutable_sac();
+  spec.config.set_threads(1);
+  return spec;
+}
+
+AlgorithmSpec OnTwoThreads(AlgorithmSpec spec) {
+  spec.config.set_threads(2);
   return spec;
 }
 
@@ -55,9 +90,20 @@ void LearnerUpdate(benchmark::State& state, const AlgorithmSpec& spec) {
       (*algorithm)->UpdateFlops() * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
   state.SetItemsProcessed(state.iterations());
 }
-BENCHMARK_CAPTURE(LearnerUpdate, dbr_connect4, Connect4Spec())
-    ->Name("LearnerUpdate/dbr/connect4")
-    ->Unit(benchmark::kMillisecond);
+#define DBR_UPDATE(name, spec)             \
+  BENCHMARK_CAPTURE(LearnerUpdate, , spec) \
+      ->Name("LearnerUpdate/" name)        \
+      ->Unit(benchmark::kMillisecond)      \
+      ->UseRealTime()
+
+DBR_UPDATE("dbr/connect4", Dbr(Connect4()));
+DBR_UPDATE("sac/hopper", Sac(Hopper()));
+DBR_UPDATE("sac/ant", Sac(Ant()));
+DBR_UPDATE("dbr/hopper", Dbr(Hopper()));
+DBR_UPDATE("dbr/ant", Dbr(Ant()));
+DBR_UPDATE("sac/ant/two_threads", OnTwoThreads(Sac(Ant())));
+DBR_UPDATE("dbr/ant/two_threads", OnTwoThreads(Dbr(Ant())));
+#undef DBR_UPDATE
 
 // The limit: a product of two square matrices in single precision.
 void Sgemm(benchmark::State& state) {

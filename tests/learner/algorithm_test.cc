@@ -15,13 +15,14 @@
 namespace dbr {
 namespace {
 
-AlgorithmSpec SpecOf(const std::string& name, std::uint64_t seed = 1) {
-  AlgorithmSpec spec = SmallSpec(seed);
-  EXPECT_EQ(AlgorithmName(spec.config), name) << "give the new algorithm its config here";
+AlgorithmSpec SpecOf(const AlgorithmId& id, std::uint64_t seed = 1) {
+  AlgorithmSpec spec = SmallSpec(seed, id.actions);
+  if (id.name == "sac") spec.config.mutable_sac();
+  EXPECT_EQ(AlgorithmName(spec.config), id.name) << "give the new algorithm its config here";
   return spec;
 }
 
-class Conformance : public testing::TestWithParam<std::string> {
+class Conformance : public testing::TestWithParam<AlgorithmId> {
  protected:
   Conformance() { algorithm_ = Make(1); }
 
@@ -30,15 +31,14 @@ class Conformance : public testing::TestWithParam<std::string> {
     EXPECT_TRUE(algorithm.ok()) << algorithm.status();
     return std::move(algorithm).value();
   }
+  Batch Random(int n) { return RandomBatch<float>(SpecOf(GetParam()), n, rng_); }
   static TensorFile StateOf(const Algorithm& algorithm) {
     TensorFile file;
     algorithm.Save(&file);
     return file;
   }
   void Update(Algorithm* algorithm, int n = 16) {
-    const Batch uniform = RandomBatch<float>(SmallSpec(), n, rng_),
-                plus = RandomBatch<float>(SmallSpec(), n, rng_),
-                minus = RandomBatch<float>(SmallSpec(), n, rng_);
+    const Batch uniform = Random(n), plus = Random(n), minus = Random(n);
     ASSERT_TRUE(algorithm->Update({uniform, plus, minus}).ok());
   }
 
@@ -93,15 +93,13 @@ TEST_P(Conformance, AnUpdateMovesEveryNetworkThatItExports) {
 
 TEST_P(Conformance, AcceptsABatchOfOneAndEmptyPartitions) {
   Update(algorithm_.get(), 1);
-  const Batch uniform = RandomBatch<float>(SmallSpec(), 4, rng_), empty;
+  const Batch uniform = Random(4), empty;
   EXPECT_TRUE(algorithm_->Update({uniform, empty, empty}).ok());
   EXPECT_EQ(algorithm_->advantages().size(), 4u);
 }
 
 TEST_P(Conformance, AnUpdateAllocatesNothing) {
-  const Batch uniform = RandomBatch<float>(SmallSpec(), 16, rng_),
-              plus = RandomBatch<float>(SmallSpec(), 16, rng_),
-              minus = RandomBatch<float>(SmallSpec(), 16, rng_);
+  const Batch uniform = Random(16), plus = Random(16), minus = Random(16);
   for (int i = 0; i < 2; ++i) ASSERT_TRUE(algorithm_->Update({uniform, plus, minus}).ok());
   if (!CountsAllocations()) GTEST_SKIP() << "allocations belong to the sanitizer in this build";
   const std::uint64_t before = AllocationCount();
@@ -111,36 +109,45 @@ TEST_P(Conformance, AnUpdateAllocatesNothing) {
 }
 
 TEST_P(Conformance, ALossThatIsNotFiniteIsNamed) {
-  Batch uniform = RandomBatch<float>(SmallSpec(), 16, rng_);
-  const Batch other = RandomBatch<float>(SmallSpec(), 16, rng_);
+  Batch uniform = Random(16);
+  const Batch other = Random(16);
   uniform.rewards[3] = NAN;
   const absl::Status status = algorithm_->Update({uniform, other, other});
   EXPECT_TRUE(absl::IsInternal(status));
   EXPECT_THAT(std::string(status.message()), testing::HasSubstr("critic_loss"));
 }
 
-INSTANTIATE_TEST_SUITE_P(Registry, Conformance, testing::ValuesIn(AlgorithmNames()));
+TEST_P(Conformance, TwoThreadsGiveWhatOneGives) {
+  TensorFile states[2];
+  for (const int threads : {1, 2}) {
+    AlgorithmSpec spec = SpecOf(GetParam());
+    spec.config.set_threads(static_cast<std::uint32_t>(threads));
+    const auto algorithm = MakeAlgorithm(spec);
+    rng_ = Rng(3);
+    for (int i = 0; i < 20; ++i) Update(algorithm->get());
+    (*algorithm)->Save(&states[threads - 1]);
+  }
+  EXPECT_EQ(states[0].tensors, states[1].tensors);
+}
+
+}
+
+INSTANTIATE_TEST_SUITE_P(Registry, Conformance, testing::ValuesIn(Algorithms()), [](const auto& info) {
+  return info.param.name + (info.param.actions == ActionKind::kDiscrete ? "Discrete" : "Continuous");
+});
 
 TEST(Registry, RefusesAnActionSpaceThatTheAlgorithmDoesNotServe) {
   AlgorithmSpec spec = SmallSpec();
-  spec.actions.kind = ActionKind::kContinuous;
-  EXPECT_THAT(std::string(MakeAlgorithm(spec).status().message()), testing::HasSubstr("continuous"));
+  spec.config.mutable_sac();
+  EXPECT_THAT(std::string(MakeAlgorithm(spec).status().message()),
+              testing::HasSubstr("serves the discrete actions of environment 'test' (dbr), found sac"));
 }
 
-TEST(DiscreteDbr, TwoThreadsGiveWhatOneGives) {
-  TensorFile states[2];
-  for (const int threads : {1, 2}) {
-    AlgorithmSpec spec = SmallSpec();
-    spec.config.set_threads(static_cast<std::uint32_t>(threads));
-    DiscreteDbr<float> dbr(spec);
-    Rng rng(3);
-    for (int i = 0; i < 20; ++i) {
-      const Batch batch = RandomBatch<float>(spec, 16, rng);
-      ASSERT_TRUE(dbr.Update(batch, batch, batch).ok());
-    }
-    dbr.Save(&states[threads - 1]);
-  }
-  EXPECT_EQ(states[0].tensors, states[1].tensors);
+TEST(Registry, RefusesASampledDivergenceOverDiscreteActions) {
+  AlgorithmSpec spec = SmallSpec();
+  spec.config.mutable_dbr()->set_divergence(DbrConfig::MMD_LAPLACIAN);
+  EXPECT_THAT(std::string(MakeAlgorithm(spec).status().message()),
+              testing::HasSubstr("expected KL or MMD_EXACT"));
 }
 
 TEST(DiscreteDbr, WarmStartLeavesQOut) {

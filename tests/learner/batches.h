@@ -6,12 +6,12 @@
 
 namespace dbr {
 
-// A small discrete problem: 5 inputs, 3 actions, two hidden layers of 8.
-inline AlgorithmSpec SmallSpec(std::uint64_t seed = 1) {
+// A small problem: 5 inputs, 3 actions (or 2 dimensions of action), two hidden layers of 8.
+inline AlgorithmSpec SmallSpec(std::uint64_t seed = 1, ActionKind actions = ActionKind::kDiscrete) {
   AlgorithmSpec spec;
   spec.env = "test";
   spec.observation_size = 5;
-  spec.actions = {ActionKind::kDiscrete, 3};
+  spec.actions = {actions, actions == ActionKind::kDiscrete ? 3 : 2};
   spec.hidden_sizes = {8, 8};
   spec.config.set_batch_size(16);
   spec.config.mutable_dbr();
@@ -19,7 +19,7 @@ inline AlgorithmSpec SmallSpec(std::uint64_t seed = 1) {
   return spec;
 }
 
-// Random transitions; action 2 is illegal in every third state.
+// Random transitions; of a discrete space action 2 is illegal in every third state.
 template <class Scalar>
 BasicBatch<Scalar> RandomBatch(const AlgorithmSpec& spec, int n, Rng& rng) {
   BasicBatch<Scalar> batch;
@@ -28,15 +28,17 @@ BasicBatch<Scalar> RandomBatch(const AlgorithmSpec& spec, int n, Rng& rng) {
   const auto draw = [&](Scalar) { return static_cast<Scalar>(2 * rng.Uniform() - 1); };
   batch.observations = batch.observations.unaryExpr(draw).eval();
   batch.next_observations = batch.next_observations.unaryExpr(draw).eval();
+  batch.actions = batch.actions.unaryExpr(draw).eval();
   batch.masks.setOnes();
   batch.next_masks.setOnes();
   for (int j = 0; j < n; ++j) {
-    const bool restricted = j % 3 == 0;
-    if (restricted) batch.masks(2, j) = batch.next_masks(2, j) = 0;
-    batch.actions(0, j) = static_cast<Scalar>(rng.Below(restricted ? 2 : 3));
     batch.rewards[j] = static_cast<Scalar>(rng.Uniform());
     batch.discounts[j] = j % 5 == 0 ? Scalar{0} : Scalar{0.99};
     batch.keys[static_cast<std::size_t>(j)] = static_cast<std::uint64_t>(j);
+    if (!spec.actions.discrete()) continue;
+    const bool restricted = j % 3 == 0;
+    if (restricted) batch.masks(2, j) = batch.next_masks(2, j) = 0;
+    batch.actions(0, j) = static_cast<Scalar>(rng.Below(restricted ? 2 : 3));
   }
   return batch;
 }
