@@ -119,6 +119,11 @@ std::string PrintConfig(const Config& config) {
   return text;
 }
 
+bool TrainsOfflineAlone(const Config& config) {
+  const LearnerConfig& learner = config.learner();
+  return learner.max_updates() > 0 && learner.max_updates() <= learner.offline_updates();
+}
+
 std::vector<int> HiddenSizes(const Config& config) {
   if (config.network().hidden_sizes().empty()) return {256, 256, 256};
   return {config.network().hidden_sizes().begin(), config.network().hidden_sizes().end()};

@@ -25,6 +25,9 @@ absl::Status CheckBounds(const google::protobuf::Message& message);
 // The effective config as text, every field with its value, defaults included; ParseConfig reads it back.
 std::string PrintConfig(const Config& config);
 
+// Whether all of the updates are made on the seed, so that no actor ever acts.
+bool TrainsOfflineAlone(const Config& config);
+
 // `hidden_sizes` or the paper's 256, 256, 256.
 std::vector<int> HiddenSizes(const Config& config);
 

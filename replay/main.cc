@@ -40,6 +40,14 @@ absl::StatusOr<ReplayServerOptions> MakeOptions(const Arguments& arguments, cons
   return options;
 }
 
+void LogSeed(const std::string& path, const SeedRecord& seed) {
+  spdlog::info(
+      "seed {}: {} transitions, {} whole episodes with a mean return of {:.1f}, loaded at {:.0f} rows/s",
+      path, seed.rows, seed.episodes, seed.return_mean, seed.rows_per_second);
+  if (seed.bad_rows > 0)
+    spdlog::warn("seed {}: {} rows with values that are not finite are left out", path, seed.bad_rows);
+}
+
 absl::Status Serve(const Arguments& arguments, const Config& config) {
   ASSIGN_OR_RETURN(const ReplayServerOptions options, MakeOptions(arguments, config));
   absl::Notification stop;
@@ -51,6 +59,7 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
     spdlog::info("resumed {} with {} transitions; {} were incomplete and are dropped", options.store.path,
                  server->recovered(), server->torn());
   }
+  if (!options.seed.path.empty()) LogSeed(options.seed.path, server->seed());
   spdlog::info("listening on {}", server->address());
   stop.WaitForNotification();
   spdlog::info("stopping");

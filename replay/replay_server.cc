@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "absl/cleanup/cleanup.h"
 #include "core/status_macros.h"
+#include "proto/config_file.h"
 
 namespace dbr {
 
@@ -25,6 +25,14 @@ ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& la
   options.buffer.limiter.min_size = replay.min_size();
   options.buffer.cumulative_advantage = replay.cumulative_advantage();
   options.buffer.seed = config.seed();
+  options.buffer.seed_share = replay.seed().share();
+  options.seed = {.path = replay.seed().path(),
+                  .layout = replay.seed().layout(),
+                  .env = config.env().name(),
+                  .discount = static_cast<float>(config.algorithm().discount()),
+                  .evict = replay.seed().evict(),
+                  .skip_bad_rows = replay.seed().skip_bad_rows(),
+                  .others_will_come = !TrainsOfflineAlone(config)};
   options.server.address = replay.address();
   options.server.allow_insecure = replay.allow_insecure();
   return options;
@@ -32,19 +40,26 @@ ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& la
 
 absl::StatusOr<std::unique_ptr<ReplayServer>> ReplayServer::Start(const ReplayServerOptions& options) {
   ASSIGN_OR_RETURN(std::unique_ptr<TransitionStore> store, TransitionStore::Open(options.store));
+  auto server = StartWith(options, std::move(store));
   // A start that fails leaves no empty store behind, which the next start would refuse to overwrite.
-  absl::Cleanup remove_new_store = [&store_options = options.store] {
-    if (!store_options.resume && !store_options.path.empty()) unlink(store_options.path.c_str());
-  };
+  if (!server.ok() && !options.store.resume && !options.store.path.empty())
+    unlink(options.store.path.c_str());
+  return server;
+}
+
+absl::StatusOr<std::unique_ptr<ReplayServer>> ReplayServer::StartWith(
+    const ReplayServerOptions& options, std::unique_ptr<TransitionStore> store) {
   const std::uint64_t recovered = store->size(), torn = store->torn();
   ASSIGN_OR_RETURN(std::unique_ptr<PartitionedBuffer> buffer,
                    PartitionedBuffer::Make(std::move(store), options.buffer));
   std::unique_ptr<ReplayServer> server(new ReplayServer(std::move(buffer)));
   server->recovered_ = recovered;
   server->torn_ = torn;
+  if (!options.seed.path.empty()) {
+    ASSIGN_OR_RETURN(server->seed_, ImportSeed(options.seed, server->buffer_.get()));
+  }
   const std::vector<grpc::Service*> services = {&server->service_};
   ASSIGN_OR_RETURN(server->running_, StartServer(options.server, services));
-  std::move(remove_new_store).Cancel();
   return server;
 }
 

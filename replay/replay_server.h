@@ -9,6 +9,8 @@
 #include "proto/config.pb.h"
 #include "proto/server.h"
 #include "replay/partitioned_buffer.h"
+#include "replay/seed_import.h"
+#include "replay/seed_record.h"
 #include "replay/service.h"
 #include "replay/transition_store.h"
 
@@ -17,6 +19,7 @@ namespace dbr {
 struct ReplayServerOptions {
   StoreOptions store;
   BufferOptions buffer;
+  SeedOptions seed;
   ServerOptions server;
 };
 
@@ -27,7 +30,8 @@ ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& la
 // A running replay server. Thread-compatible.
 class ReplayServer {
  public:
-  // Errors of TransitionStore::Open, PartitionedBuffer::Make and StartServer.
+  // Loads the seed before it serves. Errors of TransitionStore::Open, PartitionedBuffer::Make, ImportSeed and
+  // StartServer.
   static absl::StatusOr<std::unique_ptr<ReplayServer>> Start(const ReplayServerOptions& options);
   ~ReplayServer();  // Stop()
   ReplayServer(const ReplayServer&) = delete;
@@ -38,16 +42,21 @@ class ReplayServer {
   std::uint64_t recovered() const { return recovered_; }  // rows taken over from a store
   std::uint64_t torn() const { return torn_; }            // rows that were incomplete there, and dropped
 
+  const SeedRecord& seed() const { return seed_; }  // zeros where there is none
+
   // Accepts no more calls, answers those that wait, and writes the store to disk. Blocks up to some seconds.
   absl::Status Stop();
 
  private:
+  static absl::StatusOr<std::unique_ptr<ReplayServer>> StartWith(const ReplayServerOptions& options,
+                                                                 std::unique_ptr<TransitionStore> store);
   explicit ReplayServer(std::unique_ptr<PartitionedBuffer> buffer)
       : buffer_(std::move(buffer)), service_(buffer_.get()) {}
 
   std::unique_ptr<PartitionedBuffer> buffer_;
   ReplayService service_;
   RunningServer running_;
+  SeedRecord seed_;
   std::uint64_t recovered_ = 0;
   std::uint64_t torn_ = 0;
 };

@@ -1,0 +1,89 @@
+#include "replay/seed_import.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "core/status_macros.h"
+#include "replay/dataset/dataset_reader.h"
+
+namespace dbr {
+namespace {
+
+absl::StatusOr<std::unique_ptr<DatasetReader>> OpenFile(const SeedOptions& options,
+                                                        const TransitionLayout& layout) {
+  if (layout.mask_width > 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("replay.seed.path: expected an environment with continuous actions, "
+                     "for offline data has none other, found ",
+                     options.env));
+  }
+  DatasetOptions dataset{.env = options.env,
+                         .observation_size = layout.observation_width,
+                         .action_width = layout.action_width,
+                         .discount = options.discount,
+                         .skip_bad_rows = options.skip_bad_rows};
+  if (!options.layout.empty()) {
+    ASSIGN_OR_RETURN(dataset.layout, ParseDatasetLayout(options.layout));
+  }
+  return DatasetReader::Open(options.path, dataset);
+}
+
+// Before the first row is stored: the file says how many it has.
+absl::Status CheckRoom(const SeedOptions& options, std::uint64_t transitions, std::uint64_t capacity) {
+  if (transitions > capacity) {
+    return absl::InvalidArgumentError(absl::StrCat("replay.seed.path: the seed ", options.path, " has ",
+                                                   transitions, " transitions, the buffer has room for ",
+                                                   capacity, ". Raise replay.capacity to more than ",
+                                                   transitions, "."));
+  }
+  if (transitions == capacity && options.others_will_come && !options.evict) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "replay.seed.path: the seed ", options.path, " fills all ", capacity,
+        " places of the buffer and is never evicted, so that there is none for what the actors do. Raise "
+        "replay.capacity, or set replay.seed.evict: true."));
+  }
+  return absl::OkStatus();
+}
+
+SeedRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
+  return {.bad_rows = static_cast<std::uint64_t>(facts.non_finite),
+          .episodes = static_cast<std::uint64_t>(facts.episodes),
+          .return_mean = facts.return_mean,
+          .return_std = facts.return_std,
+          .return_min = facts.return_min,
+          .return_max = facts.return_max,
+          .rows_per_second = static_cast<double>(facts.transitions) / absl::ToDoubleSeconds(elapsed)};
+}
+
+}  // namespace
+
+absl::StatusOr<SeedRecord> ImportSeed(const SeedOptions& options, PartitionedBuffer* buffer) {
+  const BufferStats before = buffer->Stats();
+  if (before.seed_record.complete != 0) return before.seed_record;
+  const absl::Time start = absl::Now();
+  const TransitionLayout& layout = buffer->layout();
+  ASSIGN_OR_RETURN(const std::unique_ptr<DatasetReader> reader, OpenFile(options, layout));
+  ASSIGN_OR_RETURN(const std::int64_t transitions, reader->CountTransitions());
+  RETURN_IF_ERROR(CheckRoom(options, static_cast<std::uint64_t>(transitions), buffer->capacity()));
+  TransitionChunk chunk(layout, PartitionedBuffer::kSeedRowsPerLock);
+  std::uint64_t held_already = before.seed_rows;
+  for (;;) {
+    ASSIGN_OR_RETURN(const int rows, reader->Next(&chunk));
+    if (rows == 0) break;
+    const std::uint64_t skipped = std::min(held_already, static_cast<std::uint64_t>(rows));
+    held_already -= skipped;
+    RETURN_IF_ERROR(
+        buffer->InsertSeed(chunk.rows().subspan(skipped * static_cast<std::uint64_t>(layout.stride()))));
+  }
+  if (reader->facts().transitions == 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("replay.seed.path: expected transitions in ", options.path, ", found none"));
+  }
+  RETURN_IF_ERROR(buffer->CompleteSeed(RecordOf(reader->facts(), absl::Now() - start), !options.evict));
+  return buffer->Stats().seed_record;
+}
+
+}  // namespace dbr
