@@ -5,12 +5,9 @@
 #include <utility>
 
 #include "core/check.h"
-#include "core/rng.h"
 
 namespace dbr::bullet {
 namespace {
-
-constexpr double kLargestStartAngle = 0.1;  // rad
 
 bool AllFinite(absl::Span<const float> values) {
   return std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
@@ -24,16 +21,13 @@ LocomotionEnv::LocomotionEnv(std::string name, RobotPlan plan)
            .observation_size = task_->observation_size(),
            .actions = {ActionKind::kContinuous, task_->num_actions()},
            .max_episode_steps = kMaxEpisodeSteps};
-  start_.hinge_angles.resize(task_->num_actions());
   last_observation_.resize(spec_.observation_size);
 }
 
 void LocomotionEnv::Reset(std::uint64_t seed, absl::Span<float> observation, absl::Span<float>) {
   if (broken_) task_ = std::make_unique<LocomotionTask>(plan_);
   broken_ = false;
-  Rng rng(seed);
-  for (double& angle : start_.hinge_angles) angle = kLargestStartAngle * (2 * rng.Uniform() - 1);
-  task_->Begin(start_, observation);
+  task_->Begin(DrawStart(task_->num_actions(), seed), observation);
   std::copy(observation.begin(), observation.end(), last_observation_.begin());
   steps_left_ = kMaxEpisodeSteps;
 }

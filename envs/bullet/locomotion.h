@@ -32,7 +32,6 @@ class LocomotionEnv : public Env {
   const RobotPlan plan_;
   std::unique_ptr<LocomotionTask> task_;
   EnvSpec spec_;
-  Start start_;
   std::vector<float> last_observation_;
   int steps_left_ = 0;   // of the episode; 0: none is running
   bool broken_ = false;  // the world has to be made anew

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "core/rng.h"
 #include "envs/bullet/multibody.h"
 #include "envs/bullet/numpy_sum.h"
 #include "envs/bullet/world.h"
@@ -11,8 +12,9 @@
 namespace dbr::bullet {
 namespace {
 
-constexpr double kTargetX = 1000;  // m; the target's y is 0
-constexpr int kTorsoValues = 8;    // of an observation, before hinges and feet
+constexpr double kTargetX = 1000;  // m
+constexpr double kTargetY = 0;
+constexpr int kTorsoValues = 8;  // of an observation, before hinges and feet
 constexpr float kLargestValue = 5;
 constexpr double kTorsoSpeedScale = 0.3;
 constexpr double kHingeSpeedScale = 0.1;
@@ -57,11 +59,19 @@ struct LocomotionTask::Place {
 
   // Grows by 1 a step at a metre a second.
   double Potential() const {
-    const double dx = kTargetX - x, dy = -y;
+    const double dx = kTargetX - x, dy = kTargetY - y;
     return -std::sqrt(dy * dy + dx * dx) / World::kTimeStep;
   }
-  double AngleToTarget() const { return std::atan2(-y, kTargetX - x) - attitude.yaw; }
+  double AngleToTarget() const { return std::atan2(kTargetY - y, kTargetX - x) - attitude.yaw; }
 };
+
+Start DrawStart(int num_hinges, std::uint64_t seed) {
+  constexpr double kLargestAngle = 0.1;
+  Rng rng(seed);
+  Start start;
+  for (int i = 0; i < num_hinges; ++i) start.hinge_angles.push_back(kLargestAngle * (2 * rng.Uniform() - 1));
+  return start;
+}
 
 LocomotionTask::LocomotionTask(const RobotPlan& plan)
     : plan_(plan),
@@ -105,9 +115,7 @@ void LocomotionTask::Begin(const Start& start, absl::Span<float> observation) {
 }
 
 Progress LocomotionTask::Advance(absl::Span<const float> action, absl::Span<float> observation) {
-  DBR_CHECK(action.size() == hinges_.size());
-  ApplyTorques(action);
-  world_->Step();
+  Drive(action);
   const Place place = Locate(/*floor_in_mean=*/true);
   Observe(place, observation);
 
@@ -126,10 +134,12 @@ Progress LocomotionTask::Advance(absl::Span<const float> action, absl::Span<floa
   return progress;
 }
 
-void LocomotionTask::ApplyTorques(absl::Span<const float> action) {
+void LocomotionTask::Drive(absl::Span<const float> action) {
+  DBR_CHECK(action.size() == hinges_.size());
   for (std::size_t i = 0; i < hinges_.size(); ++i) {
     robot_->ApplyTorque(static_cast<int>(i), hinges_[i].torque_nm * std::clamp(action[i], -1.0f, 1.0f));
   }
+  world_->Step();
 }
 
 LocomotionTask::Place LocomotionTask::Locate(bool floor_in_mean) const {

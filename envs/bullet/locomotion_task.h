@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -37,6 +38,9 @@ struct Start {
   bool floor_in_mean = true;
 };
 
+// The start that a seed draws: every hinge's angle uniform in [-0.1, 0.1] rad.
+Start DrawStart(int num_hinges, std::uint64_t seed);
+
 // What a step of the task gave.
 struct Progress {
   // Alive, progress, electricity, joints at their limits, collisions of feet (always 0).
@@ -67,9 +71,10 @@ class LocomotionTask {
   // `action` [num_actions()]: the share of each hinge's torque, clipped to [-1, 1] for the torque, while its
   // cost is that of the action as given.
   Progress Advance(absl::Span<const float> action, absl::Span<float> observation);
+  // The part of Advance that is the simulator's: moves the world on under an action and looks at nothing.
+  void Drive(absl::Span<const float> action);
 
   const Multibody& robot() const { return *robot_; }
-  World& world() { return *world_; }
   absl::Span<const float> feet_on_floor() const { return feet_on_floor_; }
   double start_height_m() const { return start_height_m_; }
   double potential() const { return potential_; }
@@ -78,7 +83,6 @@ class LocomotionTask {
   struct Place;
 
   Place Locate(bool floor_in_mean) const;
-  void ApplyTorques(absl::Span<const float> action);
   void Observe(const Place& place, absl::Span<float> observation);
   void FeelFloor();
   double Electricity(absl::Span<const float> action) const;

@@ -1,41 +1,106 @@
-// Bullet robots: a step of the environment with random actions, resets included, beside the bare simulation of the
-// same world under the same torques.
-#include <benchmark/benchmark.h>
-
-#include <chrono>
-#include <memory>
+// Speed of the Bullet robots, resets and observations included, beside the bare simulation as its limit. Both
+// go through the same episodes of random actions.
+#include <cstdint>
 #include <string>
 #include <vector>
 
+#include "benchmark/benchmark.h"
 #include "core/rng.h"
+#include "envs/bullet/ant.h"
+#include "envs/bullet/half_cheetah.h"
+#include "envs/bullet/hopper.h"
+#include "envs/bullet/locomotion_task.h"
+#include "envs/bullet/walker2d.h"
 #include "envs/env.h"
 
-namespace dbr {
+namespace dbr::bullet {
 namespace {
 
+// An episode of random actions: its seed is its number.
+class Actions {
+ public:
+  Actions(int width, std::uint64_t episode) : action_(width), rng_(episode) {}
+  absl::Span<const float> Draw() {
+    for (float& value : action_) value = static_cast<float>(2 * rng_.Uniform() - 1);
+    return action_;
+  }
+
+ private:
+  std::vector<float> action_;
+  Rng rng_;
+};
+
+constexpr std::uint64_t kEpisodes = 200;
+
+// Items are steps of the environment.
 void EnvStep(benchmark::State& state, const std::string& name) {
-  const std::unique_ptr<Env> env = MakeEnv({.name = name, .opponents = {}}).value();
+  const auto env = MakeEnv({.name = name, .opponents = {}}).value();
   std::vector<float> observation(env->spec().observation_size);
-  std::vector<float> action(env->spec().actions.width());
-  Rng rng(1);
   std::uint64_t episode = 0;
+  Actions actions(env->spec().actions.width(), episode);
   env->Reset(episode, absl::MakeSpan(observation), {});
   for (auto _ : state) {
-    for (float& value : action) value = static_cast<float>(2 * rng.Uniform() - 1);
-    if (env->Step(action, absl::MakeSpan(observation), {}).done()) {
-      env->Reset(++episode, absl::MakeSpan(observation), {});
-    }
+    if (!env->Step(actions.Draw(), absl::MakeSpan(observation), {}).done()) continue;
+    episode = (episode + 1) % kEpisodes;
+    actions = Actions(env->spec().actions.width(), episode);
+    env->Reset(episode, absl::MakeSpan(observation), {});
   }
   state.SetItemsProcessed(state.iterations());
 }
 
-[[maybe_unused]] const bool kRegistered = [] {
-  for (const char* name : {"hopper", "walker2d", "half_cheetah", "ant"}) {
-    benchmark::RegisterBenchmark((std::string("EnvStep/") + name).c_str(),
-                                 [name = std::string(name)](benchmark::State& state) { EnvStep(state, name); });
+// The lengths of the first episodes, up to some thousand steps in all.
+std::vector<int> EpisodeLengths(const std::string& name) {
+  constexpr int kSteps = 4000;
+  const auto env = MakeEnv({.name = name, .opponents = {}}).value();
+  std::vector<float> observation(env->spec().observation_size);
+  std::vector<int> lengths;
+  for (int steps = 0; steps < kSteps && lengths.size() < kEpisodes; steps += lengths.back()) {
+    const std::uint64_t episode = lengths.size();
+    Actions actions(env->spec().actions.width(), episode);
+    env->Reset(episode, absl::MakeSpan(observation), {});
+    int length = 1;
+    while (!env->Step(actions.Draw(), absl::MakeSpan(observation), {}).done()) ++length;
+    lengths.push_back(length);
   }
+  return lengths;
+}
+
+// Items are steps of the simulation under the same torques; resets are not timed.
+void BulletStep(benchmark::State& state, const std::string& name, RobotPlan (*plan)()) {
+  const std::vector<int> lengths = EpisodeLengths(name);
+  LocomotionTask task(plan());
+  std::vector<float> observation(task.observation_size());
+  std::uint64_t episode = 0;
+  int steps_left = lengths[episode];
+  Actions actions(task.num_actions(), episode);
+  task.Begin(DrawStart(task.num_actions(), episode), absl::MakeSpan(observation));
+  for (auto _ : state) {
+    task.Drive(actions.Draw());
+    if (--steps_left > 0) continue;
+    state.PauseTiming();
+    episode = (episode + 1) % lengths.size();
+    steps_left = lengths[episode];
+    actions = Actions(task.num_actions(), episode);
+    task.Begin(DrawStart(task.num_actions(), episode), absl::MakeSpan(observation));
+    state.ResumeTiming();
+  }
+  state.SetItemsProcessed(state.iterations());
+}
+
+void Register(const std::string& name, RobotPlan (*plan)()) {
+  benchmark::RegisterBenchmark(("EnvStep/" + name).c_str(),
+                               [name](benchmark::State& state) { EnvStep(state, name); });
+  benchmark::RegisterBenchmark(("BulletStep/" + name).c_str(),
+                               [name, plan](benchmark::State& state) { BulletStep(state, name, plan); });
+}
+
+[[maybe_unused]] const bool kRegistered = [] {
+  Register("hopper", HopperPlan);
+  Register("walker2d", Walker2dPlan);
+  Register("half_cheetah", HalfCheetahPlan);
+  Register("ant", AntPlan);
   return true;
 }();
 
 }  // namespace
-}  // namespace dbr
+}  // namespace dbr::bullet

@@ -92,6 +92,11 @@ class World {
   std::vector<float> action_;
 };
 
+// How many episodes show what one may show: fewer where episodes are long.
+inline std::uint64_t EnoughEpisodes(const EnvSpec& spec) {
+  return spec.max_episode_steps > 100 ? 3 : 20;
+}
+
 // All that an episode of random actions showed.
 struct Episode {
   std::vector<std::vector<float>> seen;  // observation and mask, one more than there are steps

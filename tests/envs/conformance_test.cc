@@ -35,7 +35,7 @@ TEST_P(EnvConformance, TheSpecIsComplete) {
 TEST_P(EnvConformance, EveryStepWritesAllOfItsMemoryAndSaneResults) {
   World world(GetParam());
   Rng rng(3);
-  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+  for (std::uint64_t seed = 0; seed < EnoughEpisodes(world.spec()); ++seed) {
     world.Reset(seed);
     ExpectWellWritten(world, false);
     for (bool done = false; !done;) {
@@ -49,7 +49,7 @@ TEST_P(EnvConformance, EveryStepWritesAllOfItsMemoryAndSaneResults) {
 
 TEST_P(EnvConformance, EpisodesEndWithinTheStepLimit) {
   World world(GetParam());
-  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+  for (std::uint64_t seed = 0; seed < EnoughEpisodes(world.spec()); ++seed) {
     const Episode episode = PlayEpisode(world, seed);
     EXPECT_TRUE(episode.results.back().done());
     EXPECT_LE(episode.results.size(), world.spec().max_episode_steps);
@@ -59,7 +59,7 @@ TEST_P(EnvConformance, EpisodesEndWithinTheStepLimit) {
 TEST_P(EnvConformance, TheSameSeedGivesTheSameEpisode) {
   World fresh(GetParam());
   World used(GetParam());
-  for (std::uint64_t seed = 100; seed < 110; ++seed) {
+  for (std::uint64_t seed = 100; seed < 100 + EnoughEpisodes(fresh.spec()); ++seed) {
     PlayEpisode(used, seed + 1000);
     ExpectSameEpisode(PlayEpisode(fresh, seed), PlayEpisode(used, seed));
   }
