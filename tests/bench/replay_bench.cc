@@ -13,8 +13,10 @@
 #include "core/check.h"
 #include "core/rng.h"
 #include "replay/client.h"
+#include "replay/dataset/dataset_writer.h"
 #include "replay/partitioned_buffer.h"
 #include "replay/replay_server.h"
+#include "replay/seed_import.h"
 #include "replay/writer.h"
 
 namespace dbr {
@@ -215,6 +217,64 @@ void ReplaySample(benchmark::State& state) {
   state.counters["p99_us"] = latencies_us[latencies_us.size() * 99 / 100];
 }
 BENCHMARK(ReplaySample)->UseRealTime()->Unit(benchmark::kMicrosecond);
+
+// A file of robot data as `dbr dataset record` writes it: hopper's sizes, episodes of 1,000 steps.
+class SeedFile {
+ public:
+  static constexpr int kEpisodes = 200, kSteps = 1000;
+
+  SeedFile() {
+    DBR_CHECK(mkdtemp(folder_.data()) != nullptr);
+    const EnvSpec env{.name = "hopper",
+                      .observation_size = 15,
+                      .actions = {ActionKind::kContinuous, 3},
+                      .max_episode_steps = kSteps};
+    layout = TransitionLayout::Of(env);
+    const auto writer = DatasetWriter::Create(path(), {.layout = DatasetLayout::kD4rl, .env = env});
+    DBR_CHECK(writer.ok());
+    Rng rng(1);
+    std::vector<float> observations((kSteps + 1) * env.observation_size), actions(kSteps * env.actions.size),
+        rewards(kSteps);
+    for (int episode = 0; episode < kEpisodes; ++episode) {
+      for (auto* column : {&observations, &actions, &rewards}) {
+        for (float& value : *column) value = static_cast<float>(rng.Normal());
+      }
+      DBR_CHECK((*writer)->Append({observations, actions, rewards, EpisodeEnding::kTimeLimit}).ok());
+    }
+    DBR_CHECK((*writer)->Finish().ok());
+  }
+  ~SeedFile() { std::filesystem::remove_all(folder_); }
+
+  std::string path() const { return absl::StrCat(folder_, "/seed.hdf5"); }
+  std::string store() const { return absl::StrCat(folder_, "/store"); }
+  TransitionLayout layout;
+
+ private:
+  std::string folder_ = (std::filesystem::temp_directory_path() / "dbr-XXXXXX").string();
+};
+
+// From the file into a store that lies in a file too, all in one thread.
+void SeedImport(benchmark::State& state) {
+  const SeedFile file;
+  for (auto _ : state) {
+    state.PauseTiming();
+    std::filesystem::remove(file.store());
+    auto store = TransitionStore::Open({.path = file.store(),
+                                        .env = "hopper",
+                                        .layout = file.layout,
+                                        .capacity = 2 * SeedFile::kEpisodes * SeedFile::kSteps});
+    DBR_CHECK(store.ok());
+    auto buffer = PartitionedBuffer::Make(std::move(*store), {});
+    DBR_CHECK(buffer.ok());
+    state.ResumeTiming();
+    DBR_CHECK(ImportSeed({.path = file.path(), .layout = "d4rl", .env = "hopper"}, buffer->get()).ok());
+    state.PauseTiming();
+    buffer->reset();
+    state.ResumeTiming();
+  }
+  state.SetItemsProcessed(state.iterations() * SeedFile::kEpisodes * SeedFile::kSteps);
+}
+BENCHMARK(SeedImport)->UseRealTime()->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace dbr
