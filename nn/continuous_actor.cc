@@ -15,8 +15,8 @@ absl::Status ContinuousActor::Act(const PolicyNetworks& policy, ActingMode mode,
         "the mode SUPPORT serves discrete actions alone: use SAMPLE, MODE or "
         "GREEDY_Q");
   }
-  head_.Split(MlpForward<float>(policy.policy_shape(), policy.snapshot().Find(kPolicyNetwork)->data(), observations,
-                         &policy_activations_),
+  head_.Split(MlpForward<float>(policy.policy_shape(), policy.snapshot().Find(kPolicyNetwork)->data(),
+                                observations, &policy_activations_),
               kPolicyLogStd);
   if (!head_.mean().allFinite() || !head_.log_std().allFinite()) {
     return absl::InternalError(absl::StrCat("policy version ", policy.snapshot().version,

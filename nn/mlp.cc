@@ -1,42 +1,62 @@
 #include "nn/mlp.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/check.h"
+#include "nn/product.h"
 
 namespace dbr {
 namespace {
 
-template <class Scalar>
-using WeightMap = Eigen::Map<const MatrixX<Scalar>>;
+// Columns that go through all layers before the next ones come: what they leave in each layer stays in the
+// second-level cache.
+constexpr Eigen::Index kBlockColumns = 256;
 
+// Adds the bias to each of n columns of y [rows x n] and clips at zero where `relu`, in one pass.
 template <class Scalar>
-WeightMap<Scalar> Weight(const MlpShape& shape, const Scalar* parameters, int layer) {
-  return {parameters + shape.weight_offset(layer), shape.out(layer), shape.in(layer)};
-}
-
-// Adds the bias to each column and clips at zero where `relu`, in one pass.
-template <class Scalar>
-void AddBias(const Scalar* bias, bool relu, MatrixX<Scalar>* y) {
-  const Eigen::Map<const VectorX<Scalar>> b(bias, y->rows());
-  for (Eigen::Index j = 0; j < y->cols(); ++j) {
+void AddBias(const Scalar* bias, bool relu, Eigen::Map<MatrixX<Scalar>> y) {
+  const Eigen::Map<const VectorX<Scalar>> b(bias, y.rows());
+  for (Eigen::Index j = 0; j < y.cols(); ++j) {
     if (relu) {
-      y->col(j) = (y->col(j) + b).cwiseMax(Scalar{0});
+      y.col(j) = (y.col(j) + b).cwiseMax(Scalar{0});
     } else {
-      y->col(j) += b;
+      y.col(j) += b;
     }
   }
 }
 
-// The delta of a layer's input: W^T delta, zero where that input was clipped.
-template <class Scalar, class Delta>
-void PropagateDelta(const MlpShape& shape, const Scalar* parameters, int layer, const Delta& delta,
-                    MlpActivations<Scalar>* activations) {
-  MatrixX<Scalar>& previous = activations->deltas[layer - 1];
-  const MatrixX<Scalar>& input = activations->outputs[layer - 1];
-  previous.resize(shape.in(layer), delta.cols());
-  previous.noalias() = Weight(shape, parameters, layer).transpose() * delta;
+// Columns first ... first + n of `matrix`, in place.
+template <class Scalar>
+Eigen::Map<MatrixX<Scalar>> Columns(MatrixX<Scalar>* matrix, Eigen::Index first, Eigen::Index n) {
+  return {matrix->data() + first * matrix->rows(), matrix->rows(), n};
+}
+template <class Scalar>
+Operand<Scalar> ColumnsOf(const ConstMatrixRef<Scalar>& matrix, Eigen::Index first, Eigen::Index n) {
+  return {matrix.data() + first * matrix.outerStride(), matrix.rows(), n, matrix.outerStride()};
+}
+
+template <class Scalar>
+Operand<Scalar> Weight(const MlpShape& shape, const Scalar* parameters, int layer) {
+  return {parameters + shape.weight_offset(layer), shape.out(layer), shape.in(layer), shape.out(layer)};
+}
+
+// The delta of a layer's input: W^T delta [out x n], zero where that input was clipped; columns first ...
+// first + n.
+template <class Scalar>
+void PropagateDelta(const MlpShape& shape, const Scalar* parameters, int layer, const Operand<Scalar>& delta,
+                    Eigen::Index first, MlpActivations<Scalar>* activations) {
+  auto previous = Columns(&activations->deltas[layer - 1], first, delta.cols);
+  const auto input = Columns(&activations->outputs[layer - 1], first, delta.cols);
+  Product(Transposed(Weight(shape, parameters, layer)), delta, previous.data(), previous.rows());
   previous.array() = (input.array() > Scalar{0}).select(previous.array(), Scalar{0});
+}
+
+template <class Scalar>
+void ResizeDeltas(const MlpShape& shape, Eigen::Index n, MlpActivations<Scalar>* activations) {
+  activations->deltas.resize(shape.layer_count() - 1);
+  for (int layer = 1; layer < shape.layer_count(); ++layer)
+    activations->deltas[layer - 1].resize(shape.in(layer), n);
 }
 
 }  // namespace
@@ -69,15 +89,16 @@ const MatrixX<Scalar>& MlpForward(const MlpShape& shape, const Scalar* parameter
   DBR_CHECK(x.rows() == shape.input_size());
   const int layers = shape.layer_count();
   activations->outputs.resize(layers);
-  for (int layer = 0; layer < layers; ++layer) {
-    MatrixX<Scalar>& y = activations->outputs[layer];
-    y.resize(shape.out(layer), x.cols());
-    if (layer == 0) {
-      y.noalias() = Weight(shape, parameters, layer) * x;
-    } else {
-      y.noalias() = Weight(shape, parameters, layer) * activations->outputs[layer - 1];
+  for (int layer = 0; layer < layers; ++layer) activations->outputs[layer].resize(shape.out(layer), x.cols());
+  for (Eigen::Index first = 0; first < x.cols(); first += kBlockColumns) {
+    const Eigen::Index n = std::min(kBlockColumns, x.cols() - first);
+    Operand<Scalar> input = ColumnsOf(x, first, n);
+    for (int layer = 0; layer < layers; ++layer) {
+      auto y = Columns(&activations->outputs[layer], first, n);
+      Product(Weight(shape, parameters, layer), input, y.data(), y.rows());
+      AddBias<Scalar>(parameters + shape.bias_offset(layer), layer + 1 < layers, y);
+      input = {y.data(), y.rows(), n, y.rows()};
     }
-    AddBias(parameters + shape.bias_offset(layer), layer + 1 < layers, &y);
   }
   return activations->outputs.back();
 }
@@ -86,45 +107,40 @@ template <class Scalar>
 void MlpParameterGradient(const MlpShape& shape, const Scalar* parameters, const ConstMatrixRef<Scalar>& x,
                           const ConstMatrixRef<Scalar>& dy, MlpActivations<Scalar>* activations,
                           VectorX<Scalar>* gradient) {
-  const int layers = shape.layer_count();
-  DBR_CHECK(dy.rows() == shape.output_size() && dy.cols() == x.cols());
+  const Eigen::Index n = x.cols();
+  DBR_CHECK(dy.rows() == shape.output_size() && dy.cols() == n);
   gradient->resize(shape.parameter_count());
-  activations->deltas.resize(layers - 1);
-  const auto layer_gradient = [&](int layer, const auto& delta, const auto& input) {
-    Eigen::Map<MatrixX<Scalar>> weight(gradient->data() + shape.weight_offset(layer), shape.out(layer),
-                                       shape.in(layer));
+  ResizeDeltas(shape, n, activations);
+  Operand<Scalar> delta = ColumnsOf(dy, 0, n);
+  for (int layer = shape.layer_count() - 1; layer >= 0; --layer) {
+    const Operand<Scalar> input =
+        layer == 0 ? ColumnsOf(x, 0, n) : ColumnsOf<Scalar>(activations->outputs[layer - 1], 0, n);
+    Product(delta, Transposed(input), gradient->data() + shape.weight_offset(layer), shape.out(layer));
     Eigen::Map<VectorX<Scalar>> bias(gradient->data() + shape.bias_offset(layer), shape.out(layer));
-    weight.noalias() = delta * input.transpose();
-    bias = delta.col(0);
-    for (Eigen::Index j = 1; j < delta.cols(); ++j) bias += delta.col(j);
-  };
-  const auto visit = [&](int layer, const auto& delta) {
-    if (layer == 0) {
-      layer_gradient(layer, delta, x);
-    } else {
-      layer_gradient(layer, delta, activations->outputs[layer - 1]);
-      PropagateDelta(shape, parameters, layer, delta, activations);
+    bias.setZero();
+    for (Eigen::Index j = 0; j < n; ++j) {
+      bias += Eigen::Map<const VectorX<Scalar>>(delta.values + j * delta.stride, delta.rows);
     }
-  };
-  visit(layers - 1, dy);
-  for (int layer = layers - 2; layer >= 0; --layer) visit(layer, activations->deltas[layer]);
+    if (layer == 0) break;
+    PropagateDelta(shape, parameters, layer, delta, 0, activations);
+    delta = ColumnsOf<Scalar>(activations->deltas[layer - 1], 0, n);
+  }
 }
 
 template <class Scalar>
 void MlpInputGradient(const MlpShape& shape, const Scalar* parameters, const ConstMatrixRef<Scalar>& dy,
                       MlpActivations<Scalar>* activations, MatrixX<Scalar>* dx) {
-  const int layers = shape.layer_count();
-  activations->deltas.resize(layers - 1);
+  ResizeDeltas(shape, dy.cols(), activations);
   dx->resize(shape.input_size(), dy.cols());
-  if (layers == 1) {
-    dx->noalias() = Weight(shape, parameters, 0).transpose() * dy;
-    return;
+  for (Eigen::Index first = 0; first < dy.cols(); first += kBlockColumns) {
+    const Eigen::Index n = std::min(kBlockColumns, dy.cols() - first);
+    Operand<Scalar> delta = ColumnsOf(dy, first, n);
+    for (int layer = shape.layer_count() - 1; layer > 0; --layer) {
+      PropagateDelta(shape, parameters, layer, delta, first, activations);
+      delta = ColumnsOf<Scalar>(activations->deltas[layer - 1], first, n);
+    }
+    Product(Transposed(Weight(shape, parameters, 0)), delta, dx->data() + first * dx->rows(), dx->rows());
   }
-  PropagateDelta(shape, parameters, layers - 1, dy, activations);
-  for (int layer = layers - 2; layer > 0; --layer) {
-    PropagateDelta(shape, parameters, layer, activations->deltas[layer], activations);
-  }
-  dx->noalias() = Weight(shape, parameters, 0).transpose() * activations->deltas[0];
 }
 
 template <class Scalar>

@@ -16,11 +16,13 @@ Scalar LogTanhSlope(Scalar u) {
   return 2 * (std::numbers::ln2_v<Scalar> - size - std::log1p(std::exp(-2 * size)));
 }
 
+template <class Scalar>
+constexpr Scalar kHalfLogTwoPi = Scalar(0.91893853320467274178);
+
 // The log-density of a normal at `z` deviations from its mean.
 template <class Scalar>
 Scalar LogNormal(Scalar z, Scalar log_std) {
-  constexpr Scalar kHalfLogTwoPi = Scalar(0.91893853320467274178);
-  return -z * z / 2 - log_std - kHalfLogTwoPi;
+  return -z * z / 2 - log_std - kHalfLogTwoPi<Scalar>;
 }
 
 template <class Scalar>
@@ -33,23 +35,24 @@ void CheckShape(const GaussianView<Scalar>& gaussian, const ConstMatrixRef<Scala
 }  // namespace
 
 template <class Scalar>
+void SampleTanhActions(const GaussianView<Scalar>& gaussian, const ConstMatrixRef<Scalar>& noise,
+                       TanhSample<Scalar>* sample) {
+  CheckShape<Scalar>(gaussian, noise);
+  sample->before_tanh = (gaussian.mean.array() + gaussian.log_std.array().exp() * noise.array()).matrix();
+  sample->action = sample->before_tanh.array().tanh().matrix();
+}
+
+template <class Scalar>
 void SampleTanhGaussian(const GaussianView<Scalar>& gaussian, const ConstMatrixRef<Scalar>& noise,
                         TanhSample<Scalar>* sample) {
-  CheckShape<Scalar>(gaussian, noise);
-  const Eigen::Index dimensions = noise.rows(), n = noise.cols();
-  sample->before_tanh.resize(dimensions, n);
-  sample->action.resize(dimensions, n);
-  sample->log_prob.resize(n);
-  for (Eigen::Index j = 0; j < n; ++j) {
-    Scalar log_prob = 0;
-    for (Eigen::Index d = 0; d < dimensions; ++d) {
-      const Scalar u = gaussian.mean(d, j) + std::exp(gaussian.log_std(d, j)) * noise(d, j);
-      sample->before_tanh(d, j) = u;
-      sample->action(d, j) = std::tanh(u);
-      log_prob += LogNormal(noise(d, j), gaussian.log_std(d, j)) - LogTanhSlope(u);
-    }
-    sample->log_prob[j] = log_prob;
-  }
+  SampleTanhActions(gaussian, noise, sample);
+  constexpr Scalar kConstant = kHalfLogTwoPi<Scalar> + 2 * std::numbers::ln2_v<Scalar>;
+  // The logarithms of a normal's density less log(1 - tanh(u)^2), as LogTanhSlope has it, for whole matrices.
+  const auto size = sample->before_tanh.array().abs();
+  sample->terms = (-noise.array().square() / 2 - gaussian.log_std.array() - kConstant +
+                   2 * (size + (1 + (-2 * size).exp()).log()))
+                      .matrix();
+  sample->log_prob = sample->terms.colwise().sum().transpose();
 }
 
 template <class Scalar>
@@ -95,6 +98,8 @@ void TanhLogProb(const GaussianView<Scalar>& gaussian, const ConstMatrixRef<Scal
 }
 
 #define DBR_INSTANTIATE(Scalar)                                                                          \
+  template void SampleTanhActions<Scalar>(const GaussianView<Scalar>&, const ConstMatrixRef<Scalar>&,    \
+                                          TanhSample<Scalar>*);                                          \
   template void SampleTanhGaussian<Scalar>(const GaussianView<Scalar>&, const ConstMatrixRef<Scalar>&,   \
                                            TanhSample<Scalar>*);                                         \
   template void BackpropTanhSample<Scalar>(const GaussianView<Scalar>&, const ConstMatrixRef<Scalar>&,   \

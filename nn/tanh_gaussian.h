@@ -17,12 +17,18 @@ struct TanhSample {
   MatrixX<Scalar> before_tanh;  // [dimensions x n] u = mean + exp(log_std) * noise
   MatrixX<Scalar> action;       // [dimensions x n] tanh(u)
   VectorX<Scalar> log_prob;     // [n] density of the action, the tanh's change of variables included
+  MatrixX<Scalar> terms;        // [dimensions x n] of log_prob
 };
 
 // noise [dimensions x n], standard normal.
 template <class Scalar>
 void SampleTanhGaussian(const GaussianView<Scalar>& gaussian, const ConstMatrixRef<Scalar>& noise,
                         TanhSample<Scalar>* sample);
+
+// Without the log-probabilities, whose logarithms take longer than the rest.
+template <class Scalar>
+void SampleTanhActions(const GaussianView<Scalar>& gaussian, const ConstMatrixRef<Scalar>& noise,
+                       TanhSample<Scalar>* sample);
 
 // The gradient through a sample (pathwise): from those with respect to its actions, d_action [dimensions x
 // n], and its log-probabilities, d_log_prob [n], to one with respect to the parameters.

@@ -71,7 +71,7 @@ void ContinuousDbr<Scalar>::ComputeTargets(const BasicBatch<Scalar>& batch) {
   const Eigen::Index n = batch.size();
   next_pi_.Split(policy_.ForwardTarget(batch.next_observations), kPolicyLogStd);
   FillNormal(rng_, spec_.actions.size, config.target_samples() * n, &next_noise_);
-  next_draws_.Draw(next_pi_, next_noise_);
+  next_draws_.DrawActions(next_pi_, next_noise_);
   critics_.EvaluateTargets(next_draws_.CriticInput(batch.next_observations));
   target_.resize(n);
   GreatestTargetValue<Scalar>(critics_.target1(), critics_.target2(),

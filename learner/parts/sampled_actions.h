@@ -21,12 +21,13 @@ class SampledActions {
  public:
   // noise [dimensions x count * n].
   void Draw(const GaussianHead<Scalar>& head, const MatrixX<Scalar>& noise) {
-    n_ = head.mean().cols();
-    count_ = noise.cols() / n_;
-    noise_ = noise;
-    mean_ = head.mean().replicate(1, count_);
-    log_std_ = head.log_std().replicate(1, count_);
+    Repeat(head, noise);
     SampleTanhGaussian<Scalar>({mean_, log_std_}, noise_, &sample_);
+  }
+  // Without log-probabilities, and so without a way back.
+  void DrawActions(const GaussianHead<Scalar>& head, const MatrixX<Scalar>& noise) {
+    Repeat(head, noise);
+    SampleTanhActions<Scalar>({mean_, log_std_}, noise_, &sample_);
   }
 
   Eigen::Index count() const { return count_; }
@@ -55,6 +56,14 @@ class SampledActions {
   }
 
  private:
+  void Repeat(const GaussianHead<Scalar>& head, const MatrixX<Scalar>& noise) {
+    n_ = head.mean().cols();
+    count_ = noise.cols() / n_;
+    noise_ = noise;
+    mean_ = head.mean().replicate(1, count_);
+    log_std_ = head.log_std().replicate(1, count_);
+  }
+
   Eigen::Index n_ = 0, count_ = 0;
   MatrixX<Scalar> noise_, mean_, log_std_, input_;
   TanhSample<Scalar> sample_;

@@ -130,8 +130,6 @@ TEST_P(Conformance, TwoThreadsGiveWhatOneGives) {
   EXPECT_EQ(states[0].tensors, states[1].tensors);
 }
 
-}
-
 INSTANTIATE_TEST_SUITE_P(Registry, Conformance, testing::ValuesIn(Algorithms()), [](const auto& info) {
   return info.param.name + (info.param.actions == ActionKind::kDiscrete ? "Discrete" : "Continuous");
 });
