@@ -20,6 +20,7 @@ struct OpenEpisode {
   double episode_return = 0;
   int length = 0;
   bool spoiled = false;  // by a row with a value that is not finite
+  bool gap = true;       // the step before the next one was not handed out
 };
 
 absl::StatusOr<DatasetLayout> LayoutOf(const Hdf5File& file, const DatasetOptions& options) {
@@ -136,9 +137,13 @@ void DatasetReader::State::Take(const Step& step, TransitionChunk* chunk) {
   episode.spoiled = episode.spoiled || step.bad;
   if (step.has_next && !step.bad) {
     Write(step, chunk);
+    chunk->starts.push_back(episode.gap);
     if (!episode.spoiled) Mark(step, chunk);
     ++chunk->size;
     ++facts.transitions;
+    episode.gap = false;
+  } else {
+    episode.gap = true;
   }
   if (step.end == StepEnd::kNone) return;
   CountEnd(step.end == StepEnd::kTerminal);
@@ -221,6 +226,7 @@ const DatasetFacts& DatasetReader::facts() const {
 absl::StatusOr<int> DatasetReader::Next(TransitionChunk* chunk) {
   DBR_CHECK(chunk->layout == state_->layout);
   chunk->size = 0;
+  chunk->starts.clear();
   chunk->ended.clear();
   RETURN_IF_ERROR(state_->failure);
   state_->failure = state_->Fill(chunk);

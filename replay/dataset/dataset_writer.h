@@ -6,24 +6,11 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/types/span.h"
 #include "core/space.h"
 #include "replay/dataset/dataset_layout.h"
+#include "replay/dataset/episode.h"
 
 namespace dbr {
-
-// kUnfinished: the data stops before the episode does.
-enum class EpisodeEnding { kTerminal, kTimeLimit, kUnfinished };
-
-// T >= 1 steps of one episode, as views into memory of somebody else's.
-struct EpisodeView {
-  absl::Span<const float> observations;  // [T + 1][observation size]
-  absl::Span<const float> actions;       // [T][action width]
-  absl::Span<const float> rewards;       // [T], each earned by the action of its row
-  EpisodeEnding ending = EpisodeEnding::kTerminal;
-
-  int steps() const { return static_cast<int>(rewards.size()); }
-};
 
 struct DatasetWriterOptions {
   DatasetLayout layout = DatasetLayout::kD4rl;  // kD4rl or kD4rlPybullet

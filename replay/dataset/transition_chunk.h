@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "absl/types/span.h"
@@ -24,6 +25,7 @@ struct TransitionChunk {
       : layout(transition_layout), capacity(room) {
     DBR_CHECK(room > 0);
     values.resize(std::size_t{1} * room * layout.stride());
+    starts.reserve(room);
   }
 
   const float* row(int i) const { return values.data() + std::size_t{1} * i * layout.stride(); }
@@ -33,8 +35,10 @@ struct TransitionChunk {
 
   TransitionLayout layout;
   int capacity;
-  int size = 0;                     // rows that hold a transition
-  std::vector<float> values;        // [capacity x stride]
+  int size = 0;               // rows that hold a transition
+  std::vector<float> values;  // [capacity x stride]
+  std::vector<std::uint8_t>
+      starts;  // [size] 1: does not follow the transition before it (a new episode, or a gap)
   std::vector<EndedEpisode> ended;  // by rising index
 };
 
