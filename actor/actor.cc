@@ -60,6 +60,20 @@ EvaluationLoopOptions Evaluating(const Config& config, const std::string& env) {
       .every = absl::Seconds(evaluation.every_s())};
 }
 
+// Tells of episodes whose world failed: of the first, and each time their number has doubled.
+class BrokenWorlds {
+ public:
+  void Tell(const StepCounters& counters) {
+    if (counters.broken < next_) return;
+    spdlog::warn("in {} of {} episodes the simulation gave values that are not finite; they were cut there",
+                 counters.broken, counters.episodes);
+    next_ = 2 * counters.broken;
+  }
+
+ private:
+  std::uint64_t next_ = 1;
+};
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Actor>> Actor::Create(const ActorOptions& options) {
@@ -103,9 +117,11 @@ absl::Status Actor::Act() {
                        const std::optional<EpisodeEnd>& end) {
                   return Write(transition, advantage, critic_version, end);
                 });
+  BrokenWorlds worlds;
   while (!stopping_) {
     ASSIGN_OR_RETURN(const PolicySubscriber::PolicyPtr policy, subscriber_->Current());
     RETURN_IF_ERROR(loop.Step(*policy));
+    worlds.Tell(loop.counters());
   }
   return absl::OkStatus();
 }

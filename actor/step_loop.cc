@@ -61,6 +61,7 @@ absl::Status StepLoop::Emit(int i, std::uint64_t critic_version) {
   RETURN_IF_ERROR(sink_(transition, advantages_[i], critic_version, end));
   ++counters_.transitions;
   if (end.has_value()) ++counters_.episodes;
+  if (result.broken) ++counters_.broken;
   return absl::OkStatus();
 }
 

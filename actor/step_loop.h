@@ -34,6 +34,7 @@ struct StepCounters {
   std::uint64_t transitions = 0;
   std::uint64_t episodes = 0;
   std::uint64_t explored = 0;  // actions replaced by random ones
+  std::uint64_t broken = 0;    // episodes cut because their world failed
 };
 
 // All environments take one step at a time; ended episodes restart with seeds drawn from `rng`, so that the

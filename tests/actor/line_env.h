@@ -12,8 +12,8 @@
 namespace dbr {
 
 // Walks along a line. The seed says how far: seed % 4 + 2 steps; an even seed ends at a true terminal, an odd
-// one is cut there. Observation: {seed % 1000, steps so far}. Action k of three is illegal where steps % 3 ==
-// k. The reward is steps so far + action / 10.
+// one is cut there, as broken where seed % 4 is 3. Observation: {seed % 1000, steps so far}. Action k of
+// three is illegal where steps % 3 == k. The reward is steps so far + action / 10.
 class LineEnv : public Env {
  public:
   const EnvSpec& spec() const override { return spec_; }
@@ -33,11 +33,13 @@ class LineEnv : public Env {
     ++steps_;
     Write(observation, mask);
     if (steps_ == LengthOf(seed_)) (IsCut(seed_) ? result.truncated : result.terminated) = true;
+    result.broken = result.truncated && Breaks(seed_);
     return result;
   }
 
   static int LengthOf(std::uint64_t seed) { return static_cast<int>(seed % 4) + 2; }
   static bool IsCut(std::uint64_t seed) { return seed % 2 == 1; }
+  static bool Breaks(std::uint64_t seed) { return seed % 4 == 3; }
 
  private:
   void Write(absl::Span<float> observation, absl::Span<float> mask) const {

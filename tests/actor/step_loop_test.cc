@@ -66,6 +66,19 @@ TEST(StepLoopTest, BootstrapsWhereAnEpisodeIsCutAndNotWhereItTerminates) {
   EXPECT_GT(cut, 5);
 }
 
+TEST(StepLoopTest, CountsTheEpisodesWhoseWorldBroke) {
+  std::vector<Seen> seen;
+  StepLoop loop(MakeLines(kEnvs), {}, Rng(4), Into(&seen));
+  const auto policy = UntrainedPolicy(LineEnv().spec(), 5, /*with_critics=*/true);
+  for (int step = 0; step < kSteps; ++step) ASSERT_TRUE(loop.Step(*policy).ok());
+  std::uint64_t broken = 0;
+  for (const Seen& t : seen) {
+    broken += t.end.has_value() && LineEnv::Breaks(static_cast<std::uint64_t>(t.seed()));
+  }
+  EXPECT_GT(broken, 0);
+  EXPECT_EQ(loop.counters().broken, broken);
+}
+
 TEST(StepLoopTest, NextObservationIsTheFollowingObservation) {
   const std::vector<Seen> seen = Walk({}, 2);
   for (std::size_t i = 0; i + kEnvs < seen.size(); ++i) {
