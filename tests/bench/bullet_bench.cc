@@ -30,31 +30,14 @@ class Actions {
   Rng rng_;
 };
 
-constexpr std::uint64_t kEpisodes = 200;
-
-// Items are steps of the environment.
-void EnvStep(benchmark::State& state, const std::string& name) {
-  const auto env = MakeEnv({.name = name, .opponents = {}}).value();
-  std::vector<float> observation(env->spec().observation_size);
-  std::uint64_t episode = 0;
-  Actions actions(env->spec().actions.width(), episode);
-  env->Reset(episode, absl::MakeSpan(observation), {});
-  for (auto _ : state) {
-    if (!env->Step(actions.Draw(), absl::MakeSpan(observation), {}).done()) continue;
-    episode = (episode + 1) % kEpisodes;
-    actions = Actions(env->spec().actions.width(), episode);
-    env->Reset(episode, absl::MakeSpan(observation), {});
-  }
-  state.SetItemsProcessed(state.iterations());
-}
-
-// The lengths of the first episodes, up to some thousand steps in all.
+// The lengths of a robot's first episodes, up to some thousand steps in all. Episodes start again with the
+// first.
 std::vector<int> EpisodeLengths(const std::string& name) {
   constexpr int kSteps = 4000;
   const auto env = MakeEnv({.name = name, .opponents = {}}).value();
   std::vector<float> observation(env->spec().observation_size);
   std::vector<int> lengths;
-  for (int steps = 0; steps < kSteps && lengths.size() < kEpisodes; steps += lengths.back()) {
+  for (int steps = 0; steps < kSteps; steps += lengths.back()) {
     const std::uint64_t episode = lengths.size();
     Actions actions(env->spec().actions.width(), episode);
     env->Reset(episode, absl::MakeSpan(observation), {});
@@ -63,6 +46,23 @@ std::vector<int> EpisodeLengths(const std::string& name) {
     lengths.push_back(length);
   }
   return lengths;
+}
+
+// Items are steps of the environment.
+void EnvStep(benchmark::State& state, const std::string& name) {
+  const std::uint64_t episodes = EpisodeLengths(name).size();
+  const auto env = MakeEnv({.name = name, .opponents = {}}).value();
+  std::vector<float> observation(env->spec().observation_size);
+  std::uint64_t episode = 0;
+  Actions actions(env->spec().actions.width(), episode);
+  env->Reset(episode, absl::MakeSpan(observation), {});
+  for (auto _ : state) {
+    if (!env->Step(actions.Draw(), absl::MakeSpan(observation), {}).done()) continue;
+    episode = (episode + 1) % episodes;
+    actions = Actions(env->spec().actions.width(), episode);
+    env->Reset(episode, absl::MakeSpan(observation), {});
+  }
+  state.SetItemsProcessed(state.iterations());
 }
 
 // Items are steps of the simulation under the same torques; resets are not timed.
