@@ -28,6 +28,7 @@ class GroupPlayer {
         options_(options),
         cancelled_(cancelled),
         returns_(options.episodes, 0.0),
+        lengths_(options.episodes, 0.0),
         scores_(options.episodes, std::numeric_limits<double>::quiet_NaN()) {}
 
   int group_count() const { return (options_.episodes + kEvaluationColumns - 1) / kEvaluationColumns; }
@@ -55,7 +56,11 @@ class GroupPlayer {
                             .score_mean = score.mean,
                             .score_stderr = score.standard_error,
                             .return_mean = episode_return.mean,
-                            .return_stderr = episode_return.standard_error};
+                            .return_stderr = episode_return.standard_error,
+                            .return_std = episode_return.standard_error * std::sqrt(options_.episodes),
+                            .return_min = *std::min_element(returns_.begin(), returns_.end()),
+                            .return_max = *std::max_element(returns_.begin(), returns_.end()),
+                            .length_mean = EstimateMean(lengths_).mean};
   }
 
  private:
@@ -95,6 +100,7 @@ class GroupPlayer {
         if (!playing[i]) continue;
         const StepResult& result = envs->Step(i, actions);
         returns_[first + i] += result.reward;
+        lengths_[first + i] += 1;
         if (!result.done()) continue;
         if (envs->spec().has_score) scores_[first + i] = result.score;
         playing[i] = false;
@@ -111,6 +117,7 @@ class GroupPlayer {
   std::atomic<int> next_group_ = 0;
   std::atomic<bool> failed_ = false;
   std::vector<double> returns_;  // [episodes]; each entry belongs to the thread that plays it
+  std::vector<double> lengths_;  // [episodes]
   std::vector<double> scores_;   // [episodes]
   mutable absl::Mutex mutex_;
   absl::Status status_ ABSL_GUARDED_BY(mutex_);

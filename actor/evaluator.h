@@ -29,6 +29,10 @@ struct EvaluationResult {
   double score_stderr = 0;
   double return_mean = 0;  // of undiscounted sums of rewards
   double return_stderr = 0;
+  double return_std = 0;  // of single episodes; NaN for one alone
+  double return_min = 0;
+  double return_max = 0;
+  double length_mean = 0;  // steps of the agent
 };
 
 // Plays exactly `episodes` episodes; episode k has the environment seed `seed * 2^20 + k`, so that a

@@ -26,16 +26,21 @@ ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& la
   options.buffer.cumulative_advantage = replay.cumulative_advantage();
   options.buffer.seed = config.seed();
   options.buffer.seed_share = replay.seed().share();
-  options.seed = {.path = replay.seed().path(),
-                  .layout = replay.seed().layout(),
-                  .env = config.env().name(),
-                  .discount = static_cast<float>(config.algorithm().discount()),
-                  .evict = replay.seed().evict(),
-                  .skip_bad_rows = replay.seed().skip_bad_rows(),
-                  .others_will_come = !TrainsOfflineAlone(config)};
+  options.seed = SeedOptionsFrom(config);
   options.server.address = replay.address();
   options.server.allow_insecure = replay.allow_insecure();
   return options;
+}
+
+SeedOptions SeedOptionsFrom(const Config& config) {
+  const SeedConfig& seed = config.replay().seed();
+  return {.path = seed.path(),
+          .layout = seed.layout(),
+          .env = config.env().name(),
+          .discount = static_cast<float>(config.algorithm().discount()),
+          .evict = seed.evict(),
+          .skip_bad_rows = seed.skip_bad_rows(),
+          .others_will_come = !TrainsOfflineAlone(config)};
 }
 
 absl::StatusOr<std::unique_ptr<ReplayServer>> ReplayServer::Start(const ReplayServerOptions& options) {

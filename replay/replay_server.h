@@ -27,6 +27,9 @@ struct ReplayServerOptions {
 // tolerance of 0 becomes a tenth of capacity * samples_per_insert.
 ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& layout);
 
+// What `config` says of the seed.
+SeedOptions SeedOptionsFrom(const Config& config);
+
 // A running replay server. Thread-compatible.
 class ReplayServer {
  public:

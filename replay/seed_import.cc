@@ -12,26 +12,6 @@
 namespace dbr {
 namespace {
 
-absl::StatusOr<std::unique_ptr<DatasetReader>> OpenFile(const SeedOptions& options,
-                                                        const TransitionLayout& layout) {
-  if (layout.mask_width > 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("replay.seed.path: expected an environment with continuous actions, "
-                     "for offline data has none other, found ",
-                     options.env));
-  }
-  DatasetOptions dataset{.env = options.env,
-                         .observation_size = layout.observation_width,
-                         .action_width = layout.action_width,
-                         .discount = options.discount,
-                         .skip_bad_rows = options.skip_bad_rows};
-  if (!options.layout.empty()) {
-    ASSIGN_OR_RETURN(dataset.layout, ParseDatasetLayout(options.layout));
-  }
-  return DatasetReader::Open(options.path, dataset);
-}
-
-// Before the first row is stored: the file says how many it has.
 absl::Status CheckRoom(const SeedOptions& options, std::uint64_t transitions, std::uint64_t capacity) {
   if (transitions > capacity) {
     return absl::InvalidArgumentError(absl::StrCat("replay.seed.path: the seed ", options.path, " has ",
@@ -48,6 +28,30 @@ absl::Status CheckRoom(const SeedOptions& options, std::uint64_t transitions, st
   return absl::OkStatus();
 }
 
+// A reader of the file, whose transitions fit.
+absl::StatusOr<std::unique_ptr<DatasetReader>> OpenFitting(const SeedOptions& options,
+                                                           const TransitionLayout& layout,
+                                                           std::uint64_t capacity) {
+  if (layout.mask_width > 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("replay.seed.path: expected an environment with continuous actions, "
+                     "for offline data has none other, found ",
+                     options.env));
+  }
+  DatasetOptions dataset{.env = options.env,
+                         .observation_size = layout.observation_width,
+                         .action_width = layout.action_width,
+                         .discount = options.discount,
+                         .skip_bad_rows = options.skip_bad_rows};
+  if (!options.layout.empty()) {
+    ASSIGN_OR_RETURN(dataset.layout, ParseDatasetLayout(options.layout));
+  }
+  ASSIGN_OR_RETURN(std::unique_ptr<DatasetReader> reader, DatasetReader::Open(options.path, dataset));
+  ASSIGN_OR_RETURN(const std::int64_t transitions, reader->CountTransitions());
+  RETURN_IF_ERROR(CheckRoom(options, static_cast<std::uint64_t>(transitions), capacity));
+  return reader;
+}
+
 SeedRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
   return {.bad_rows = static_cast<std::uint64_t>(facts.non_finite),
           .episodes = static_cast<std::uint64_t>(facts.episodes),
@@ -60,14 +64,18 @@ SeedRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
 
 }  // namespace
 
+absl::Status CheckSeedFits(const SeedOptions& options, const TransitionLayout& layout,
+                           std::uint64_t capacity) {
+  return OpenFitting(options, layout, capacity).status();
+}
+
 absl::StatusOr<SeedRecord> ImportSeed(const SeedOptions& options, PartitionedBuffer* buffer) {
   const BufferStats before = buffer->Stats();
   if (before.seed_record.complete != 0) return before.seed_record;
   const absl::Time start = absl::Now();
   const TransitionLayout& layout = buffer->layout();
-  ASSIGN_OR_RETURN(const std::unique_ptr<DatasetReader> reader, OpenFile(options, layout));
-  ASSIGN_OR_RETURN(const std::int64_t transitions, reader->CountTransitions());
-  RETURN_IF_ERROR(CheckRoom(options, static_cast<std::uint64_t>(transitions), buffer->capacity()));
+  ASSIGN_OR_RETURN(const std::unique_ptr<DatasetReader> reader,
+                   OpenFitting(options, layout, buffer->capacity()));
   TransitionChunk chunk(layout, PartitionedBuffer::kSeedRowsPerLock);
   std::uint64_t held_already = before.seed_rows;
   for (;;) {

@@ -1,9 +1,12 @@
 // Loading offline data from a file into a buffer that begins with it.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "core/transition.h"
 #include "replay/partitioned_buffer.h"
 #include "replay/seed_record.h"
 
@@ -18,6 +21,11 @@ struct SeedOptions {
   bool skip_bad_rows = false;  // else a row with a value that is not finite is an error
   bool others_will_come = true;  // then a seed that is never evicted must leave room
 };
+
+// Opens the file and counts its transitions, without reading them: whether it is data of such an environment
+// that fits a buffer of `capacity`. Errors as ImportSeed's, but those of bad rows.
+absl::Status CheckSeedFits(const SeedOptions& options, const TransitionLayout& layout,
+                           std::uint64_t capacity);
 
 // Reads the whole file into `buffer`, all in its order, and completes its seed; goes on where an import into
 // the same store was broken off, and does nothing where the store has its seed already. Returns what the

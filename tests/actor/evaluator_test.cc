@@ -44,11 +44,13 @@ TEST(EvaluatorTest, AgreesWithEpisodesPlayedOneByOneFromTheirSeeds) {
   PolicyRunner runner;
   Rng unused(0);
   MatrixX<float> action(1, 1);
-  std::vector<double> scores, returns;
+  std::vector<double> scores, returns, lengths;
   for (int k = 0; k < kEpisodes; ++k) {
     alone->Reset(0, kSeed * (1 << 20) + k);
     EXPECT_EQ(alone->observations().sum(), k % 2) << "the agent starts where the seed is even";
+    lengths.push_back(0);
     do {
+      ++lengths.back();
       ASSERT_TRUE(runner.Act(*policy, MODE, alone->observations(), alone->masks(), unused, action).ok());
       alone->Step(0, action);
       alone->Advance();
@@ -60,6 +62,10 @@ TEST(EvaluatorTest, AgreesWithEpisodesPlayedOneByOneFromTheirSeeds) {
   EXPECT_EQ(together.score_stderr, EstimateMean(scores).standard_error);
   EXPECT_EQ(together.return_mean, EstimateMean(returns).mean);
   EXPECT_EQ(together.return_stderr, EstimateMean(returns).standard_error);
+  EXPECT_DOUBLE_EQ(together.return_std, EstimateMean(returns).standard_error * std::sqrt(kEpisodes));
+  EXPECT_EQ(together.return_min, -1);
+  EXPECT_EQ(together.return_max, 1);
+  EXPECT_EQ(together.length_mean, EstimateMean(lengths).mean);
 }
 
 TEST(EvaluatorTest, NamesWhatItPlayed) {
