@@ -45,6 +45,7 @@ struct AlgorithmSpec {
   int observation_size = 0;
   ActionSpace actions;
   std::vector<int> hidden_sizes;
+  bool normalize_observations = false;
   AlgorithmConfig config;
   std::uint64_t seed = 0;
 };

@@ -45,6 +45,7 @@ absl::StatusOr<AlgorithmSpec> MakeSpec(const Config& config) {
                        .observation_size = env->spec().observation_size,
                        .actions = env->spec().actions,
                        .hidden_sizes = HiddenSizes(config),
+                       .normalize_observations = config.network().normalize_observations(),
                        .config = config.algorithm(),
                        .seed = config.seed()};
 }

@@ -4,6 +4,7 @@
 #include "learner/algorithm.h"
 #include "learner/algorithms/continuous_dbr.h"
 #include "learner/algorithms/discrete_dbr.h"
+#include "learner/algorithms/normalized.h"
 #include "learner/algorithms/sac.h"
 
 namespace dbr {
@@ -59,7 +60,8 @@ absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& sp
     serving.push_back(entry.name);
     if (entry.config_case != spec.config.algorithm_case()) continue;
     if (absl::Status status = CheckOptions(spec); !status.ok()) return status;
-    return entry.make(spec);
+    std::unique_ptr<Algorithm> algorithm = entry.make(spec);
+    return spec.normalize_observations ? Normalized(spec, std::move(algorithm)) : std::move(algorithm);
   }
   const std::string name = AlgorithmName(spec.config);
   return absl::InvalidArgumentError(absl::StrCat("config field 'algorithm': expected one that serves the ",
