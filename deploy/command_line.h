@@ -21,6 +21,7 @@ void AddLaunch(CLI::App* app, int* exit_code);
 void AddStats(CLI::App* app, int* exit_code);
 void AddEvaluate(CLI::App* app, int* exit_code);
 void AddProbe(CLI::App* app, int* exit_code);
+void AddDataset(CLI::App* app, int* exit_code);
 
 // Prints "dbr COMMAND: MESSAGE" to stderr; 2 for what the user typed or wrote (InvalidArgument), 1 for the
 // rest.

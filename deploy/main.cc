@@ -17,6 +17,7 @@ int Main(int argc, char** argv) {
   dbr::AddStats(&app, &exit_code);
   dbr::AddEvaluate(&app, &exit_code);
   dbr::AddProbe(&app, &exit_code);
+  dbr::AddDataset(&app, &exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

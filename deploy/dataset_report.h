@@ -1,0 +1,26 @@
+// What `dbr dataset` says of a file.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "replay/dataset/dataset_facts.h"
+#include "replay/dataset/dataset_layout.h"
+
+namespace dbr {
+
+struct DatasetReport {
+  std::string path;
+  std::string env;  // empty: the file does not say
+  DatasetLayout layout = DatasetLayout::kD4rl;
+  DatasetFacts facts;
+};
+
+// A line for each fact.
+std::string DatasetText(const DatasetReport& report);
+
+// {layout, rows, transitions, episodes, terminals, timeouts, non_finite, return: {mean, std, min, max}}; the
+// figures of the return are null where no episode ended.
+nlohmann::ordered_json DatasetJson(const DatasetReport& report);
+
+}  // namespace dbr

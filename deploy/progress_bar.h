@@ -1,0 +1,44 @@
+// How far a long command is.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <string>
+
+#include "absl/time/time.h"
+
+namespace dbr {
+
+// What a bar tells.
+struct BarState {
+  std::string label;
+  std::string unit;  // of what is counted: "steps"
+  std::int64_t done = 0;
+  std::int64_t total = 0;
+  absl::Duration elapsed;
+};
+
+// "hopper random  ████▌      45%  450k of 1.0M steps · 18k steps/s · 0:30 left", at most `width` cells.
+std::string BarText(const BarState& state, int width);
+
+// Writes it: in place on a terminal, else as a line now and then. One thread.
+class ProgressBar {
+ public:
+  // `every`: how often at most a line is written where `out` is no terminal.
+  ProgressBar(std::FILE* out, BarState state, absl::Time now, absl::Duration every);
+  ~ProgressBar();  // clears a terminal's line
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  void Update(std::int64_t done, absl::Time now);
+
+ private:
+  std::FILE* const out_;
+  const bool terminal_;
+  const absl::Duration every_;
+  const absl::Time start_;
+  absl::Time last_;  // when it was written
+  BarState state_;
+};
+
+}  // namespace dbr

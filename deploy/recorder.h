@@ -1,0 +1,40 @@
+// Plays episodes to be kept, on every core.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "absl/status/status.h"
+#include "nn/policy.h"
+#include "replay/dataset/episode.h"
+
+namespace dbr {
+
+struct RecordOptions {
+  std::string env;
+  std::shared_ptr<const PolicyNetworks> policy;  // acts by its mean; null: actions are uniform in [-1, 1]
+  std::int64_t steps = 0;                        // at least 1
+  std::uint64_t seed = 1;
+  int threads = 0;  // 0: one for each core
+};
+
+// What recording hears of itself. Both are called by the thread that called Record.
+struct RecordSinks {
+  std::function<absl::Status(const EpisodeView&)> episode;
+  std::function<void(std::int64_t)> progress;  // steps played so far; several times a second
+};
+
+// Plays episodes 0, 1, 2, ... and hands them to `sinks.episode` in this order, options.steps steps in all:
+// the last episode is given only as far as they reach, and is then unfinished. Each episode has seeds of its
+// own, and episodes run in groups of a size that depends on options.steps alone, so that what comes out
+// depends on env, policy, steps and seed, not on the number of threads. An episode whose world failed ends as
+// cut before the step that failed. Blocks; Cancelled soon after `cancelled` becomes true. Other errors:
+// InvalidArgument for an unknown environment, one with discrete actions, or a policy that does not fit it;
+// Internal for a policy that gives values not finite; those of `sinks.episode`.
+absl::Status RecordEpisodes(const RecordOptions& options, const RecordSinks& sinks,
+                            const std::atomic<bool>& cancelled);
+
+}  // namespace dbr
