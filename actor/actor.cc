@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::uint64_t kActorStream = 1 << 20;      // of the config's seed; the actor's index is added
 constexpr std::uint64_t kEvaluatorStream = 1 << 19;  // of the config's seed
+constexpr std::size_t kBufferedSteps = 16;           // of each environment, where the config leaves it open
 constexpr absl::Duration kStopCheck = absl::Milliseconds(100);
 constexpr absl::Duration kReportTimeout = absl::Seconds(5);
 
@@ -45,7 +46,8 @@ WriterOptions Writing(const ActorOptions& options, const EnvSpec& env) {
   writing.layout = TransitionLayout::Of(env);
   writing.batch_bytes = actor.batch_bytes();
   writing.window = static_cast<int>(actor.window());
-  writing.buffered_transitions = actor.buffered_transitions();
+  writing.buffered_transitions =
+      actor.buffered_transitions() > 0 ? actor.buffered_transitions() : kBufferedSteps * actor.envs();
   return writing;
 }
 
