@@ -13,6 +13,8 @@
 
 namespace dbr {
 
+struct Figure;  // envs/figure.h
+
 // What a step gave. `terminated`: the task ended, no future value. `truncated`: cut at the time limit, the
 // future has value.
 struct StepResult {
@@ -41,6 +43,9 @@ class Env {
   // comes next.
   virtual StepResult Step(absl::Span<const float> action, absl::Span<float> observation,
                           absl::Span<float> mask) = 0;
+
+  // What it looks like now, for drawing; after the first Reset. False where it has no figure.
+  virtual bool GetFigure(Figure*) const { return false; }
 };
 
 // What an environment is made with.

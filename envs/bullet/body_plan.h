@@ -59,7 +59,8 @@ struct Part {
   Vec3 pivot{};          // of its joint, in its own frame
   std::optional<Hinge> hinge{};
   std::vector<Shape> shapes{};
-  double mass_kg = 0;  // 0: that of its volume at 1,000 kg/m3
+  double mass_kg = 0;     // 0: that of its volume at 1,000 kg/m3
+  bool far_side = false;  // seen from the side, it is behind; of no weight to the simulation
 };
 
 // How the torso hangs in the world: it slides forward and up and turns about the axis to the left, or it is

@@ -60,4 +60,9 @@ StepResult LocomotionEnv::Break(absl::Span<float> observation) {
   return result;
 }
 
+bool LocomotionEnv::GetFigure(Figure* figure) const {
+  task_->GetFigure(figure);
+  return true;
+}
+
 }  // namespace dbr::bullet

@@ -25,6 +25,7 @@ class LocomotionEnv : public Env {
   void Reset(std::uint64_t seed, absl::Span<float> observation, absl::Span<float> mask) override;
   StepResult Step(absl::Span<const float> action, absl::Span<float> observation,
                   absl::Span<float> mask) override;
+  bool GetFigure(Figure* figure) const override;
 
  private:
   StepResult Break(absl::Span<float> observation);

@@ -5,9 +5,11 @@
 
 #include "core/check.h"
 #include "core/rng.h"
+#include "envs/bullet/limbs.h"
 #include "envs/bullet/multibody.h"
 #include "envs/bullet/numpy_sum.h"
 #include "envs/bullet/world.h"
+#include "envs/figure.h"
 
 namespace dbr::bullet {
 namespace {
@@ -202,6 +204,15 @@ int LocomotionTask::CountHingesAtLimit() const {
   int count = 0;
   for (const float place : hinge_places_) count += std::abs(place) > kAtLimit;
   return count;
+}
+
+void LocomotionTask::GetFigure(Figure* figure) const {
+  const btVector3 place = robot_->LinkPose(robot_->torso_link()).getOrigin();
+  figure->view = plan_.body.root == Root::kPlanar ? View::kSide : View::kSlant;
+  figure->place = {place.x(), place.y(), place.z()};
+  figure->speed_m_s = robot_->TorsoVelocity().x();
+  figure->seconds_a_step = World::kTimeStep;
+  DescribeLimbs(plan_.body, *robot_, figure);
 }
 
 }  // namespace dbr::bullet

@@ -10,6 +10,10 @@
 #include "absl/types/span.h"
 #include "envs/bullet/body_plan.h"
 
+namespace dbr {
+struct Figure;
+}
+
 namespace dbr::bullet {
 
 class Multibody;
@@ -74,7 +78,8 @@ class LocomotionTask {
   // The part of Advance that is the simulator's: moves the world on under an action and looks at nothing.
   void Drive(absl::Span<const float> action);
 
-  const Multibody& robot() const { return *robot_; }
+  void GetFigure(Figure* figure) const;
+
   absl::Span<const float> feet_on_floor() const { return feet_on_floor_; }
   double start_height_m() const { return start_height_m_; }
   double potential() const { return potential_; }

@@ -29,10 +29,6 @@ double VolumeOf(const Part& part) {
   return volume;
 }
 
-btTransform PoseOf(const Rod& rod) {
-  return btTransform(btQuaternion(btVector3(0, 1, 0), rod.tilt_rad), Widen(rod.middle));
-}
-
 std::unique_ptr<btCollisionShape> MakeChild(const Shape& shape) {
   if (const auto* bone = std::get_if<Bone>(&shape)) {
     const btVector3 ends[] = {Widen(bone->from), Widen(bone->to)};
@@ -46,6 +42,10 @@ std::unique_ptr<btCollisionShape> MakeChild(const Shape& shape) {
 }
 
 }  // namespace
+
+btTransform PoseOf(const Rod& rod) {
+  return btTransform(btQuaternion(btVector3(0, 1, 0), rod.tilt_rad), Widen(rod.middle));
+}
 
 btVector3 CentreOf(const Part& part) {
   for (const Shape& shape : part.shapes) {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "BulletCollision/CollisionShapes/btCollisionShape.h"
-#include "LinearMath/btVector3.h"
+#include "LinearMath/btTransform.h"
 #include "envs/bullet/body_plan.h"
 
 namespace dbr::bullet {
@@ -13,6 +13,9 @@ namespace dbr::bullet {
 inline btVector3 Widen(const Vec3& v) {
   return btVector3(v.x, v.y, v.z);
 }
+
+// In the frame of its part, its length along z.
+btTransform PoseOf(const Rod& rod);
 
 // The centre of mass as PyBullet's importer places it: the middle of the first bone, and the frame's origin
 // for a part of rods or a ball alone.

@@ -22,21 +22,25 @@ Hinge Bend(float lower_degrees, float upper_degrees, double torque_nm) {
 
 // A leg's parts; the left ones' names end in `side`. Heights are over the floor.
 void AddLeg(const std::string& side, std::vector<Part>& parts) {
+  const bool far_side = !side.empty();  // seen from the right, the left leg is behind
   parts.push_back({.name = "thigh" + side,
                    .parent = "torso",
                    .pivot = {0, 0, 1.05f},
                    .hinge = Bend(-150, 0, kLegTorque),
-                   .shapes = {Bone{{0, 0, 1.05f}, {0, 0, 0.6f}, 0.05f}}});
+                   .shapes = {Bone{{0, 0, 1.05f}, {0, 0, 0.6f}, 0.05f}},
+                   .far_side = far_side});
   parts.push_back({.name = "leg" + side,
                    .parent = "thigh" + side,
                    .pivot = {0, 0, 0.6f},
                    .hinge = Bend(-150, 0, kLegTorque),
-                   .shapes = {Bone{{0, 0, 0.6f}, {0, 0, 0.1f}, 0.04f}}});
+                   .shapes = {Bone{{0, 0, 0.6f}, {0, 0, 0.1f}, 0.04f}},
+                   .far_side = far_side});
   parts.push_back({.name = "foot" + side,
                    .parent = "leg" + side,
                    .pivot = {0, 0, 0.1f},
                    .hinge = Bend(-45, 45, kFootTorque),
-                   .shapes = {Bone{{0, 0, 0.1f}, {0.2f, 0, 0.1f}, 0.06f}}});
+                   .shapes = {Bone{{0, 0, 0.1f}, {0.2f, 0, 0.1f}, 0.06f}},
+                   .far_side = far_side});
 }
 
 }  // namespace

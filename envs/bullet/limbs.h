@@ -1,0 +1,13 @@
+// Where the limbs and joints of a robot are, for drawing.
+#pragma once
+
+#include "envs/bullet/body_plan.h"
+#include "envs/bullet/multibody.h"
+#include "envs/figure.h"
+
+namespace dbr::bullet {
+
+// Replaces the limbs and joints of `figure` by those of the robot, which is of that plan.
+void DescribeLimbs(const BodyPlan& plan, const Multibody& robot, Figure* figure);
+
+}  // namespace dbr::bullet
