@@ -14,6 +14,7 @@
 #include "core/status_macros.h"
 #include "deploy/command_line.h"
 #include "deploy/interrupt.h"
+#include "deploy/result_tables.h"
 #include "deploy/results.h"
 #include "deploy/terminal.h"
 

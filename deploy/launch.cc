@@ -2,7 +2,6 @@
 
 #include <spdlog/sinks/basic_file_sink.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <utility>
 
@@ -14,6 +13,7 @@
 #include "core/safetensors.h"
 #include "core/status_macros.h"
 #include "deploy/interrupt.h"
+#include "deploy/result_tables.h"
 #include "deploy/terminal.h"
 #include "nn/policy.h"
 
@@ -21,9 +21,9 @@ namespace dbr {
 namespace {
 
 constexpr absl::Duration kAskEvery = absl::Milliseconds(500);
-constexpr absl::Duration kLineEvery = absl::Seconds(10);  // where the output is no terminal
-constexpr absl::Duration kSummaryEvery = absl::Seconds(10);
+constexpr absl::Duration kLineEvery = absl::Seconds(10);     // where the output is no terminal
 constexpr absl::Duration kServingWithin = absl::Minutes(2);  // a large store takes its time to be opened
+constexpr absl::Duration kFirstAnswerWithin = absl::Seconds(10);
 constexpr absl::Duration kLastAnswerWithin = absl::Seconds(2);
 
 SupervisorOptions OptionsOf(const LaunchConfig& config) {
@@ -37,6 +37,25 @@ SupervisorOptions OptionsOf(const LaunchConfig& config) {
 std::string Reason(const RunSummary& summary) {
   if (summary.ended == "interrupted") return "stopped by a signal";
   return absl::StrCat("reached ", summary.ended);
+}
+
+const char* EpisodesWord(const EnvSpec& env) {
+  return env.has_score ? " games" : " episodes";
+}
+
+// What ends the run, for people.
+std::string Until(const Config& config, const EnvSpec& env) {
+  const LaunchConfig& limits = config.launch();
+  std::vector<std::string> until;
+  if (limits.max_seconds() > 0) until.push_back(Clock(absl::Seconds(limits.max_seconds())));
+  if (limits.max_episodes() > 0)
+    until.push_back(absl::StrCat(WithCommas(limits.max_episodes()), EpisodesWord(env)));
+  if (limits.max_steps() > 0) until.push_back(absl::StrCat(WithCommas(limits.max_steps()), " online steps"));
+  const std::uint64_t updates = config.learner().max_updates();
+  if (updates > 0) until.push_back(absl::StrCat(WithCommas(updates), " updates"));
+  if (limits.stop_at_return() != 0)
+    until.push_back(absl::StrCat("an evaluated return of ", limits.stop_at_return()));
+  return until.empty() ? "it is stopped" : absl::StrJoin(until, " or ");
 }
 
 }  // namespace
@@ -61,6 +80,8 @@ Launch::Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_p
   summary_.algorithm = AlgorithmName(plan_.config);
   summary_.seed = plan_.config.seed();
   summary_.config = plan_.config_source;
+  summary_.seed_buffer.path = plan_.config.replay().seed().path();
+  summary_.offline_updates = plan_.config.learner().offline_updates();
   summary_.ended = "running";
   ++summary_.launches;
 }
@@ -82,7 +103,7 @@ absl::StatusOr<int> Launch::Run() {
   }
   SaveSummary();
   Say(absl::StrCat(
-      "training ended (", Reason(summary_), "): ", WithCommas(summary_.games), " games, ",
+      "training ended (", Reason(summary_), "): ", WithCommas(summary_.games), EpisodesWord(plan_.env), ", ",
       WithCommas(summary_.transitions), " transitions, ", WithCommas(summary_.updates), " updates in ",
       Clock(absl::Seconds(summary_.training_s)),
       saved ? "; all is saved" : absl::StrCat("; NOT all could be saved, see ", plan_.folder.log("launch"))));
@@ -97,17 +118,13 @@ absl::StatusOr<int> Launch::Run() {
 }
 
 void Launch::Announce() {
-  const LaunchConfig& limits = plan_.config.launch();
-  std::vector<std::string> until;
-  if (limits.max_seconds() > 0) until.push_back(Clock(absl::Seconds(limits.max_seconds())));
-  if (limits.max_episodes() > 0) until.push_back(absl::StrCat(WithCommas(limits.max_episodes()), " games"));
-  const std::uint64_t updates = plan_.config.learner().max_updates();
-  if (updates > 0) until.push_back(absl::StrCat(WithCommas(updates), " updates"));
+  const std::string actors =
+      plan_.actors == 0 ? "no actors" : absl::StrCat(plan_.actors, plan_.actors == 1 ? " actor" : " actors");
   Say(absl::StrCat(plan_.resume ? "continuing " : "training ", summary_.algorithm, " on ", summary_.env,
-                   ", seed ", summary_.seed, ", ", plan_.actors, plan_.actors == 1 ? " actor" : " actors",
-                   ", until ", until.empty() ? "it is stopped" : absl::StrJoin(until, " or "),
+                   ", seed ", summary_.seed, ", ", actors, ", until ", Until(plan_.config, plan_.env),
                    "; Ctrl-C stops and saves"));
   Say(absl::StrCat("run folder: ", plan_.folder.root));
+  if (!summary_.seed_buffer.path.empty()) Say(absl::StrCat("seed buffer: ", summary_.seed_buffer.path));
 }
 
 absl::Status Launch::StartAll() {
@@ -118,18 +135,39 @@ absl::Status Launch::StartAll() {
   };
   ASSIGN_OR_RETURN(supervisor_, Supervisor::Create(std::move(options)));
   supervisor_->set_restarting(false);
-  for (ProcessSpec& process : Processes(plan_, programs_)) {
+  for (ProcessSpec& process : Services(plan_, programs_)) {
     const std::string name = process.name;
     RETURN_IF_ERROR(supervisor_->Start(std::move(process)));
     if (name == "replay") RETURN_IF_ERROR(WaitUntilServing(name, plan_.replay_address));
     if (name == "learner") RETURN_IF_ERROR(WaitUntilServing(name, plan_.learner_address));
     if (supervisor_->stop_signals() > 0) return absl::OkStatus();
   }
+  if (summary_.offline_updates == 0) RETURN_IF_ERROR(StartActors());
   supervisor_->set_restarting(true);
   monitor_ = std::make_unique<RunMonitor>(plan_.replay_address, plan_.learner_address, kAskEvery,
                                           [supervisor = supervisor_.get()] { supervisor->Wake(); });
   training_since_ = absl::Now();
+  TellOfTheSeed();
   return absl::OkStatus();
+}
+
+absl::Status Launch::StartActors() {
+  acting_ = true;
+  for (ProcessSpec& process : Actors(plan_, programs_))
+    RETURN_IF_ERROR(supervisor_->Start(std::move(process)));
+  return absl::OkStatus();
+}
+
+void Launch::TellOfTheSeed() {
+  summary_.Update(monitor_->Ask(kFirstAnswerWithin));
+  const SeedSummary& seed = summary_.seed_buffer;
+  if (seed.rows == 0) return;
+  Say(absl::StrCat("the seed holds ", WithCommas(seed.rows), " transitions, ", WithCommas(seed.episodes),
+                   " whole episodes with a mean return of ", Fixed(seed.return_mean, 1), " ± ",
+                   Fixed(seed.return_std, 1), "; it was loaded at ", Compact(seed.rows_per_second),
+                   " rows/s"));
+  if (seed.bad_rows > 0)
+    Say(absl::StrCat(WithCommas(seed.bad_rows), " rows with values that are not finite are left out"));
 }
 
 // OK also where a stop signal came first.
@@ -145,66 +183,6 @@ absl::Status Launch::WaitUntilServing(const std::string& name, const std::string
     RETURN_IF_ERROR(supervisor_->Wait(absl::InfiniteFuture()));
   }
   return absl::OkStatus();
-}
-
-absl::Status Launch::Train() {
-  while (supervisor_->stop_signals() == 0) {
-    const absl::Time now = absl::Now();
-    Observe(now);
-    if (LimitReached()) return absl::OkStatus();
-    const std::uint32_t limit = plan_.config.launch().max_seconds();
-    absl::Time deadline = absl::InfiniteFuture();  // the monitor wakes us
-    if (limit > 0) deadline = now + absl::Seconds(limit - summary_.training_s);
-    RETURN_IF_ERROR(supervisor_->Wait(deadline));
-  }
-  summary_.ended = "interrupted";
-  return absl::OkStatus();
-}
-
-void Launch::Observe(absl::Time now) {
-  const RunSample sample = monitor_->Latest();
-  if (!first_.replay.has_value()) first_.replay = sample.replay;
-  summary_.Update(sample);
-  summary_.training_s = before_.training_s + absl::ToDoubleSeconds(now - training_since_);
-  summary_.restarts = before_.restarts + supervisor_->restarts();
-  const LaunchConfig& limits = plan_.config.launch();
-  if (limits.max_seconds() > 0 && summary_.training_s >= limits.max_seconds()) {
-    summary_.ended = "max_seconds";
-  } else if (limits.max_episodes() > 0 && summary_.games >= limits.max_episodes()) {
-    summary_.ended = "max_episodes";
-  } else if (sample.learner.has_value() && sample.learner->finished()) {
-    summary_.ended = "max_updates";
-  }
-  if (sample.replay.has_value()) line_.Update({sample, TimeLeft()}, now);
-  if (now - summary_saved_ < kSummaryEvery) return;
-  summary_saved_ = now;
-  SaveSummary();
-}
-
-bool Launch::LimitReached() const {
-  return summary_.ended != "running";
-}
-
-std::optional<absl::Duration> Launch::TimeLeft() const {
-  const LaunchConfig& limits = plan_.config.launch();
-  std::optional<absl::Duration> left;
-  const auto within = [&left](double seconds) {
-    if (!left.has_value() || absl::Seconds(seconds) < *left) left = absl::Seconds(seconds);
-  };
-  if (limits.max_seconds() > 0) within(limits.max_seconds() - summary_.training_s);
-  const double here = summary_.training_s - before_.training_s;
-  if (limits.max_episodes() > 0 && first_.replay.has_value() && summary_.games > first_.replay->episodes()) {
-    const double games_per_second = static_cast<double>(summary_.games - first_.replay->episodes()) / here;
-    within((static_cast<double>(limits.max_episodes()) - static_cast<double>(summary_.games)) /
-           games_per_second);
-  }
-  const std::uint64_t updates = plan_.config.learner().max_updates();
-  const RunSample sample = monitor_->Latest();
-  if (updates > 0 && sample.learner.has_value() && sample.learner->updates_per_second() > 0) {
-    within((static_cast<double>(updates) - static_cast<double>(summary_.updates)) /
-           sample.learner->updates_per_second());
-  }
-  return left;
 }
 
 // Actors first; then what the services count is final and, where `ask` is set, noted; then the services. True
@@ -247,7 +225,9 @@ absl::Status Launch::FinalEvaluation(bool* interrupted) {
     summary_.final_results.push_back(*std::move(result));
   }
   SaveSummary();
-  const std::string table = ResultTable(summary_.final_results);
+  std::string table = ResultTable(summary_.final_results);
+  if (const std::string returns = ReturnsTable(summary_); !returns.empty())
+    absl::StrAppend(&table, "\n", returns);
   Say(table);
   return WriteFileAtomically(ResultsPath(plan_.folder), table);
 }

@@ -7,10 +7,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
+#include "deploy/evaluation_curve.h"
 #include "deploy/health.h"
 #include "deploy/monitor.h"
 #include "deploy/progress.h"
@@ -26,20 +28,26 @@ class Launch {
   // `programs`: the folder of dbr-replay, dbr-learner and dbr-actor. Internal where the log cannot be opened.
   static absl::StatusOr<std::unique_ptr<Launch>> Create(RunPlan plan, std::string programs, std::FILE* out);
 
-  // Starts everything, trains until a limit of the config or a signal, stops everything with its state saved,
-  // and evaluates the last policy. Blocks; gives the exit status (0, or 130 after a signal), or the first
-  // failure.
+  // Starts everything (the actors after the offline phase), trains until a limit of the config or a signal,
+  // stops everything with its state saved, and evaluates the last policy. Blocks; gives the exit status (0,
+  // or 130 after a signal), or the first failure.
   absl::StatusOr<int> Run();
 
  private:
   Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_ptr<spdlog::logger> log);
   void Announce();
   absl::Status StartAll();
+  absl::Status StartActors();
+  void TellOfTheSeed();
   absl::Status WaitUntilServing(const std::string& name, const std::string& address);
+  // Watching (launch_watch.cc).
   absl::Status Train();
   void Observe(absl::Time now);
-  bool LimitReached() const;
-  std::optional<absl::Duration> TimeLeft() const;
+  // Which of the config's limits the run has come to; empty: none.
+  std::string LimitReached(const RunSample& sample, const std::vector<EvaluationPoint>& evaluations) const;
+  bool OfflinePhaseIsOver(const RunSample& sample) const;
+  std::optional<absl::Duration> TimeLeft(const RunSample& sample) const;
+
   bool StopAll(bool ask);
   absl::Status FinalEvaluation(bool* interrupted);
   void Say(const std::string& text);
@@ -54,7 +62,8 @@ class Launch {
   absl::Time started_ = absl::InfiniteFuture();
   absl::Time training_since_ = absl::InfiniteFuture();
   absl::Time summary_saved_ = absl::InfinitePast();
-  RunSample first_;  // for rates of this launch
+  RunSample first_;      // for rates of this launch
+  bool acting_ = false;  // the actors were started
   std::unique_ptr<Supervisor> supervisor_;
   std::unique_ptr<RunMonitor> monitor_;
 };

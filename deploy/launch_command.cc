@@ -57,16 +57,27 @@ void AddLaunch(CLI::App* app, int* exit_code) {
   command->add_option("--run-dir", flags->options.run_dir, "Folder of the run [runs/ENV-ALGORITHM-DATE-TIME]")
       ->type_name("DIR");
   command->add_flag("--resume", flags->options.resume, "Continue the run in --run-dir");
+  command
+      ->add_option("--seed-buffer", flags->options.seed_buffer,
+                   "HDF5 file of offline data that the replay server begins with (replay.seed.path)")
+      ->type_name("FILE");
+  command
+      ->add_option("--seed-layout", flags->options.seed_layout,
+                   "Its layout where the file does not say it: d4rl, d4rl_pybullet or minari")
+      ->type_name("NAME");
+  command->add_flag("--skip-bad-rows", flags->options.skip_bad_rows,
+                    "Leave out its rows with values that are not finite");
   command->footer(
-      "Ends at launch.max_seconds, launch.max_episodes or learner.max_updates of the config, or on Ctrl-C; "
-      "everything is\n"
-      "saved first. A second Ctrl-C kills the process that is being waited for.\n"
+      "Ends at launch.max_seconds, max_episodes, max_steps or stop_at_return or learner.max_updates of the "
+      "config, or on\n"
+      "Ctrl-C; everything is saved first. A second Ctrl-C kills the process that is being waited for.\n"
       "Exit status: 0 after a limit, 130 after Ctrl-C or SIGTERM, 2 for a bad config or flag, 1 for other "
       "failures.\n\n"
       "Examples:\n"
       "  dbr launch deploy/configs/connect4.textproto\n"
       "  dbr launch deploy/configs/connect4.textproto --set launch.max_seconds=60 --set "
       "algorithm.dbr.epsilon=0.1 --seed 2\n"
+      "  dbr launch deploy/configs/hopper_finetune.textproto --seed-buffer hopper-medium.hdf5\n"
       "  dbr launch --resume --run-dir runs/first");
   command->callback([flags, exit_code] {
     const absl::StatusOr<int> result = RunLaunch(*flags);

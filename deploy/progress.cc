@@ -1,5 +1,7 @@
 #include "deploy/progress.h"
 
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/match.h"
@@ -31,12 +33,7 @@ std::string Score(const RunSample& sample, absl::string_view opponent, bool word
   return words ? score : std::string(absl::StripPrefix(score, "0"));
 }
 
-// Environments without opponents have one evaluation, with its return.
 std::string Scores(const RunSample& sample, bool words) {
-  if (sample.learner.has_value()) {
-    const EvaluationReport* report = FindReport(*sample.learner, "");
-    if (report != nullptr) return absl::StrCat("return ", Fixed(report->return_mean(), 1));
-  }
   std::vector<std::string> parts;
   const bool any = sample.learner.has_value() && sample.learner->evaluations_size() > 0;
   for (const char* opponent : kWatched) {
@@ -45,6 +42,15 @@ std::string Scores(const RunSample& sample, bool words) {
     parts.push_back(absl::StrCat(name, " ", Score(sample, opponent, words)));
   }
   return absl::StrJoin(parts, " ");
+}
+
+std::string EvaluatedReturn(const RunSample& sample) {
+  const EvaluationReport* report = sample.learner.has_value() ? FindReport(*sample.learner, "") : nullptr;
+  return report == nullptr ? "–" : Fixed(report->return_mean(), 1);
+}
+
+std::string TrainReturn(const StatsReply& replay) {
+  return replay.episodes() == 0 ? "–" : Fixed(replay.recent_return_mean(), 1);
 }
 
 std::string Policy(const LearnerStatus& learner, bool words) {
@@ -56,25 +62,41 @@ std::string Policy(const LearnerStatus& learner, bool words) {
                : absl::StrCat("v", version, " lag ", lag);
 }
 
+// What acting and learning do.
+std::vector<std::string> Doing(const Progress& progress, const StatsReply& replay,
+                               const LearnerStatus& learner, bool words) {
+  const std::string rate = absl::StrCat(Compact(learner.updates_per_second()), words ? " updates/s" : " u/s");
+  if (progress.offline_updates > 0) {
+    return {words ? absl::StrCat("offline: ", WithCommas(learner.updates()), " of ",
+                                 WithCommas(progress.offline_updates), " updates")
+                  : absl::StrCat("offline ", Compact(static_cast<double>(learner.updates())), "/",
+                                 Compact(static_cast<double>(progress.offline_updates))),
+            rate};
+  }
+  const char* episodes = progress.scored ? " games" : words ? " episodes" : " ep";
+  return {
+      absl::StrCat(words ? WithCommas(replay.episodes()) : Compact(static_cast<double>(replay.episodes())),
+                   episodes),
+      absl::StrCat(Compact(replay.insert_rate()), words ? " transitions/s" : " t/s"), rate};
+}
+
+std::vector<std::string> Success(const Progress& progress, const StatsReply& replay, bool words) {
+  if (progress.scored) return {Scores(progress.sample, words)};
+  std::vector<std::string> parts;
+  if (progress.offline_updates == 0)
+    parts.push_back(absl::StrCat(words ? "train return " : "train ", TrainReturn(replay)));
+  parts.push_back(absl::StrCat(words ? "eval return " : "eval ", EvaluatedReturn(progress.sample)));
+  return parts;
+}
+
 std::string Line(const Progress& progress, bool words) {
   const StatsReply replay = progress.sample.replay.value_or(StatsReply());
   const LearnerStatus learner = progress.sample.learner.value_or(LearnerStatus());
-  std::vector<std::string> parts;
-  if (words) {
-    parts = {absl::StrCat(WithCommas(replay.episodes()), " games"),
-             absl::StrCat(Compact(replay.insert_rate()), " transitions/s"),
-             absl::StrCat(Compact(learner.updates_per_second()), " updates/s"),
-             absl::StrCat("D ", Compact(replay.total()), "  D+ ", Compact(replay.plus()), "  D- ",
-                          Compact(replay.minus()))};
-  } else {
-    parts = {absl::StrCat(Compact(replay.episodes()), " games"),
-             absl::StrCat(Compact(replay.insert_rate()), " t/s"),
-             absl::StrCat(Compact(learner.updates_per_second()), " u/s"),
-             absl::StrCat("D ", Compact(replay.total()), "+", Compact(replay.plus()), "-",
-                          Compact(replay.minus()))};
-  }
+  std::vector<std::string> parts = Doing(progress, replay, learner, words);
+  parts.push_back(absl::StrCat("D ", Compact(replay.total()), words ? "  D+ " : "+", Compact(replay.plus()),
+                               words ? "  D- " : "-", Compact(replay.minus())));
   parts.push_back(Policy(learner, words));
-  parts.push_back(Scores(progress.sample, words));
+  for (std::string& part : Success(progress, replay, words)) parts.push_back(std::move(part));
   if (progress.sample.replay_away) parts.push_back("replay away");
   if (progress.sample.learner_away) parts.push_back("learner away");
   if (progress.left.has_value()) parts.push_back(absl::StrCat(Clock(*progress.left), words ? " left" : ""));

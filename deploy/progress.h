@@ -1,6 +1,7 @@
 // The one live line of a launch.
 #pragma once
 
+#include <cstdint>
 #include <cstdio>
 #include <optional>
 #include <string>
@@ -14,11 +15,15 @@ namespace dbr {
 struct Progress {
   RunSample sample;
   std::optional<absl::Duration> left;  // empty: no limit, or not known yet
+  bool scored = true;                  // the environment's episodes are games with a score
+  std::uint64_t offline_updates = 0;   // while the phase lasts: how many it has
 };
 
 // One line of at most `width` cells: games, transitions/s, updates/s, sizes of D, D+ and D-, policy version
 // and lag (how many versions the slowest subscriber is behind), the newest scores against random and mcts:10,
-// time left. Words where there is room, abbreviations where there is not.
+// time left. Without scores it counts episodes and shows the mean return of the actors' last ones and of the
+// newest evaluation; in the offline phase how far it is, in place of what actors do. Words where there is
+// room, abbreviations where there is not.
 std::string ProgressText(const Progress& progress, int width);
 
 // Writes it: in place on a terminal, else as a line now and then. One thread.

@@ -1,27 +1,16 @@
 #include "deploy/results.h"
 
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
 #include "core/file_io.h"
-#include "deploy/terminal.h"
 
 namespace dbr {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-// Siu, Traish and Xu 2021, table of results, the two Connect-4 rows: mean score and standard deviation.
-struct PaperRow {
-  const char* opponent;
-  const char* dbr;
-  const char* bear;
-  const char* ddqn;
-};
-constexpr PaperRow kPaper[] = {{"random", "0.982 ± 0.016", "0.967 ± 0.116", "0.589 ± 0.161"},
-                               {"mcts:10", "0.912 ± 0.079", "0.750 ± 0.187", "0.214 ± 0.161"}};
 
 Json Number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
@@ -31,13 +20,49 @@ Json Estimate(double mean, double standard_error) {
   return {{"mean", Number(mean)}, {"stderr", Number(standard_error)}};
 }
 
-std::string PaperCells(absl::string_view opponent) {
-  for (const PaperRow& row : kPaper) {
-    if (opponent == row.opponent) {
-      return absl::StrCat(PadLeft(row.dbr, 17), PadLeft(row.bear, 17), PadLeft(row.ddqn, 17));
-    }
+Json Spread(double std, double min, double max) {
+  return {{"std", Number(std)}, {"min", Number(min)}, {"max", Number(max)}};
+}
+
+Json ToJson(const EvaluationPoint& point) {
+  Json json = {{"updates", point.updates},
+               {"steps", point.steps},
+               {"return_mean", Number(point.return_mean)},
+               {"return_std", Number(point.return_std)},
+               {"episodes", point.episodes},
+               {"policy_version", point.policy_version}};
+  if (std::isfinite(point.score_mean)) {
+    json["score_mean"] = point.score_mean;
+    json["score_stderr"] = Number(point.score_stderr);
   }
-  return absl::StrCat(PadLeft("–", 17), PadLeft("–", 17), PadLeft("–", 17));
+  if (!point.opponent.empty()) json["opponent"] = point.opponent;
+  return json;
+}
+
+Json ToJson(const std::optional<EvaluationPoint>& point) {
+  return point.has_value() ? ToJson(*point) : Json(nullptr);
+}
+
+Json SeedJson(const SeedSummary& seed) {
+  Json returns = {{"mean", Number(seed.return_mean)}};
+  returns.update(Spread(seed.return_std, seed.return_min, seed.return_max));
+  return {{"path", seed.path},         {"rows", seed.rows},
+          {"bad_rows", seed.bad_rows}, {"episodes", seed.episodes},
+          {"return", returns},         {"rows_per_second", Number(seed.rows_per_second)}};
+}
+
+Json ReturnsJson(const RunSummary& summary) {
+  Json end = nullptr;
+  if (!summary.final_results.empty()) {
+    end = ToJson(summary.final_results[0])["return"];
+    end["updates"] = summary.updates;
+    end["steps"] = summary.transitions;
+    end["episodes"] = summary.final_results[0].episodes;
+  }
+  return {{"seed", Number(summary.seed_buffer.return_mean)},
+          {"after_offline", ToJson(summary.AfterOffline())},
+          {"lowest_online", ToJson(summary.curve.LowestOnline())},
+          {"end", end}};
 }
 
 std::uint64_t Count(const Json& json, const char* key) {
@@ -45,81 +70,90 @@ std::uint64_t Count(const Json& json, const char* key) {
   return found != json.end() && found->is_number_unsigned() ? found->get<std::uint64_t>() : 0;
 }
 
-double Seconds(const Json& json, const char* key) {
+double Real(const Json& json, const char* key, double otherwise) {
   const auto found = json.find(key);
-  return found != json.end() && found->is_number() ? found->get<double>() : 0;
+  return found != json.end() && found->is_number() ? found->get<double>() : otherwise;
+}
+
+std::vector<EvaluationPoint> ReadCurve(const Json& json) {
+  std::vector<EvaluationPoint> points;
+  const auto found = json.find("evaluations");
+  if (found == json.end() || !found->is_array()) return points;
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  for (const Json& entry : *found) {
+    if (!entry.is_object()) continue;
+    const auto opponent = entry.find("opponent");
+    points.push_back(
+        {.opponent = opponent != entry.end() && opponent->is_string() ? opponent->get<std::string>() : "",
+         .policy_version = Count(entry, "policy_version"),
+         .updates = Count(entry, "updates"),
+         .steps = Count(entry, "steps"),
+         .episodes = Count(entry, "episodes"),
+         .score_mean = Real(entry, "score_mean", kNaN),
+         .score_stderr = Real(entry, "score_stderr", kNaN),
+         .return_mean = Real(entry, "return_mean", kNaN),
+         .return_std = Real(entry, "return_std", kNaN)});
+  }
+  return points;
 }
 
 }  // namespace
 
-std::string ResultTable(absl::Span<const EvaluationResult> results) {
-  const bool connect4 = !results.empty() && results[0].env == "connect4";
-  const bool scores = !results.empty() && std::isfinite(results[0].score_mean);
-  std::string table = absl::StrCat(PadRight(" opponent", 12), PadLeft("games", 8),
-                                   PadLeft(scores ? "score ± s.e." : "return ± s.e.", 18));
-  if (connect4) {
-    absl::StrAppend(&table, " │", PadLeft("paper: DBR", 17), PadLeft("BEAR", 17), PadLeft("Double DQN", 17));
-  }
-  absl::StrAppend(&table, "\n");
-  for (const EvaluationResult& result : results) {
-    const double mean = scores ? result.score_mean : result.return_mean;
-    const double error = scores ? result.score_stderr : result.return_stderr;
-    const std::string name = result.opponent.empty() ? result.env : result.opponent;
-    const std::string cell = absl::StrCat(Fixed(mean, scores ? 3 : 1), " ± ", Fixed(error, scores ? 3 : 1));
-    absl::StrAppend(&table, PadRight(absl::StrCat(" ", name), 12), PadLeft(WithCommas(result.episodes), 8),
-                    PadLeft(cell, 18));
-    if (connect4) absl::StrAppend(&table, " │", PaperCells(result.opponent));
-    absl::StrAppend(&table, "\n");
-  }
-  if (connect4) {
-    absl::StrAppend(&table, " A win counts 1, a draw 0.5; each side starts half of the games. ",
-                    "The paper's ± is the standard deviation.\n");
-  }
-  return table;
-}
-
 Json ToJson(const EvaluationResult& result) {
-  return {{"env", result.env},
-          {"opponent", result.opponent},
-          {"episodes", result.episodes},
-          {"seed", result.seed},
-          {"score", Estimate(result.score_mean, result.score_stderr)},
-          {"return", Estimate(result.return_mean, result.return_stderr)}};
+  Json json = {{"env", result.env},
+               {"opponent", result.opponent},
+               {"episodes", result.episodes},
+               {"seed", result.seed},
+               {"score", Estimate(result.score_mean, result.score_stderr)},
+               {"return", Estimate(result.return_mean, result.return_stderr)}};
+  if (std::isfinite(result.score_mean)) return json;
+  json["return"].update(Spread(result.return_std, result.return_min, result.return_max));
+  json["steps"] = {{"mean", Number(result.length_mean)}};
+  return json;
 }
 
 std::string ResultsPath(const RunFolder& folder) {
   return absl::StrCat(folder.root, "/results.txt");
 }
 
-void RunSummary::Update(const RunSample& sample) {
+std::vector<EvaluationPoint> RunSummary::Update(const RunSample& sample) {
   if (sample.replay.has_value()) {
-    games = sample.replay->episodes();
-    transitions = sample.replay->inserted();
+    const StatsReply& replay = *sample.replay;
+    games = replay.episodes();
+    transitions = replay.inserted();
+    seed_buffer.rows = replay.seed_rows();
+    seed_buffer.bad_rows = replay.seed_bad_rows();
+    seed_buffer.episodes = replay.seed_episodes();
+    seed_buffer.return_mean = replay.seed_return_mean();
+    seed_buffer.return_std = replay.seed_return_std();
+    seed_buffer.return_min = replay.seed_return_min();
+    seed_buffer.return_max = replay.seed_return_max();
+    seed_buffer.rows_per_second = replay.seed_rows_per_second();
   }
   if (sample.learner.has_value()) {
     updates = sample.learner->updates();
     policy_version = sample.learner->policy_version();
-    if (sample.learner->evaluations_size() > 0) {
-      evaluations.assign(sample.learner->evaluations().begin(), sample.learner->evaluations().end());
-    }
   }
+  return curve.Update(sample);
+}
+
+std::optional<EvaluationPoint> RunSummary::AfterOffline() const {
+  return offline_updates > 0 ? curve.AfterOffline(offline_updates) : std::nullopt;
 }
 
 absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder) {
   Json evaluations = Json::array();
-  for (const EvaluationReport& report : summary.evaluations) {
-    evaluations.push_back({{"opponent", report.opponent()},
-                           {"episodes", report.episodes()},
-                           {"policy_version", report.policy_version()},
-                           {"updates", report.updates()},
-                           {"score", Estimate(report.score_mean(), report.score_stderr())},
-                           {"return", Estimate(report.return_mean(), report.return_stderr())}});
-  }
+  for (const EvaluationPoint& point : summary.curve.points()) evaluations.push_back(ToJson(point));
   Json final_results = Json::array();
   for (const EvaluationResult& result : summary.final_results) final_results.push_back(ToJson(result));
   Json json = {{"env", summary.env},       {"algorithm", summary.algorithm}, {"seed", summary.seed},
                {"config", summary.config}, {"run_folder", folder.root},      {"ended", summary.ended}};
   if (!summary.failure.empty()) json["failure"] = summary.failure;
+  if (summary.seed_buffer.rows > 0) {
+    json["seed_buffer"] = SeedJson(summary.seed_buffer);
+    json["offline_updates"] = summary.offline_updates;
+    json["returns"] = ReturnsJson(summary);
+  }
   json.update(Json{{"wall_s", summary.wall_s},
                    {"training_s", summary.training_s},
                    {"launches", summary.launches},
@@ -141,14 +175,15 @@ RunSummary ReadSummary(const RunFolder& folder) {
   if (!text.ok()) return summary;
   const Json json = Json::parse(*text, nullptr, /*allow_exceptions=*/false);
   if (!json.is_object()) return summary;
-  summary.wall_s = Seconds(json, "wall_s");
-  summary.training_s = Seconds(json, "training_s");
+  summary.wall_s = Real(json, "wall_s", 0);
+  summary.training_s = Real(json, "training_s", 0);
   summary.launches = Count(json, "launches");
   summary.games = Count(json, "games");
   summary.transitions = Count(json, "transitions");
   summary.updates = Count(json, "updates");
   summary.policy_version = Count(json, "policy_version");
   summary.restarts = Count(json, "restarts");
+  summary.curve = EvaluationCurve(ReadCurve(json));
   return summary;
 }
 

@@ -16,7 +16,10 @@
 #include "core/file_io.h"
 #include "core/status_macros.h"
 #include "deploy/results.h"
+#include "envs/env.h"
 #include "proto/config_file.h"
+#include "replay/replay_server.h"
+#include "replay/seed_import.h"
 
 namespace dbr {
 namespace {
@@ -45,7 +48,7 @@ absl::Status MakeFolder(const RunFolder& folder) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<Config> LoadForLaunch(const LaunchOptions& options) {
+absl::StatusOr<Config> LoadNamed(const LaunchOptions& options) {
   if (!options.config.empty()) return LoadConfig(options.config, options.overrides);
   if (options.resume && !options.run_dir.empty()) {
     return LoadConfig(RunFolder{options.run_dir}.config(), options.overrides);
@@ -53,6 +56,43 @@ absl::StatusOr<Config> LoadForLaunch(const LaunchOptions& options) {
   return absl::InvalidArgumentError(
       "which run? Give a config file (for example deploy/configs/connect4.textproto), or --resume with "
       "--run-dir.");
+}
+
+// The config with what the flags say of the seed, whose path is made absolute.
+absl::StatusOr<Config> LoadForLaunch(const LaunchOptions& options) {
+  ASSIGN_OR_RETURN(Config config, LoadNamed(options));
+  if (options.seed_buffer.empty() && config.replay().seed().path().empty()) {
+    if (options.seed_layout.empty() && !options.skip_bad_rows) return config;
+    return absl::InvalidArgumentError(
+        "--seed-layout and --skip-bad-rows: of which seed? Name it with --seed-buffer.");
+  }
+  SeedConfig* seed = config.mutable_replay()->mutable_seed();
+  if (!options.seed_buffer.empty()) seed->set_path(options.seed_buffer);
+  if (!options.seed_layout.empty()) seed->set_layout(options.seed_layout);
+  if (options.skip_bad_rows) seed->set_skip_bad_rows(true);
+  seed->set_path(std::filesystem::absolute(seed->path()).lexically_normal().string());
+  return config;
+}
+
+absl::StatusOr<EnvSpec> SpecOf(const Config& config) {
+  ASSIGN_OR_RETURN(
+      const std::unique_ptr<Env> env,
+      MakeEnv({.name = config.env().name(),
+               .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
+  return env->spec();
+}
+
+// Before a folder is made for a run that could not begin.
+absl::Status CheckSeed(const Config& config, const EnvSpec& env) {
+  if (config.replay().seed().path().empty()) {
+    if (config.learner().offline_updates() == 0) return absl::OkStatus();
+    return absl::InvalidArgumentError(absl::StrCat(
+        "learner.offline_updates: ", config.learner().offline_updates(),
+        " updates are to be made on a seed, and none is named. Give one with --seed-buffer FILE; "
+        "this records one:\n  dbr dataset record --env ",
+        env.name, " --quality medium --steps 1000000 --out ", env.name, "-medium.hdf5"));
+  }
+  return CheckSeedFits(SeedOptionsFrom(config), TransitionLayout::Of(env), config.replay().capacity());
 }
 
 absl::Status CheckRunFolder(const RunFolder& folder) {
@@ -79,7 +119,34 @@ absl::StatusOr<Config> Identity(const Config& config) {
   *identity.mutable_network() = whole.network();
   *identity.mutable_algorithm() = whole.algorithm();
   identity.mutable_replay()->set_capacity(whole.replay().capacity());
+  *identity.mutable_replay()->mutable_seed() = whole.replay().seed();
+  identity.mutable_replay()->mutable_seed()->clear_share();
   return identity;
+}
+
+int ActorsFor(const Config& config) {
+  if (TrainsOfflineAlone(config)) return 0;
+  const int configured = static_cast<int>(config.actor().processes());
+  return configured > 0 ? configured : DefaultActors(static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+ProcessSpec MakeProcess(const RunPlan& plan, const std::string& programs, const std::string& name,
+                        const char* program, const std::vector<std::string>& arguments, int rank) {
+  ProcessSpec process;
+  process.name = name;
+  process.log = plan.folder.log(name);
+  process.command = {absl::StrCat(programs, "/", program), "--config", plan.folder.config(), "--run-dir",
+                     plan.folder.root};
+  process.command.insert(process.command.end(), arguments.begin(), arguments.end());
+  process.stop_rank = rank;
+  return process;
+}
+
+ProcessSpec MakeActor(const RunPlan& plan, const std::string& programs, const std::string& name, int index) {
+  return MakeProcess(
+      plan, programs, name, "dbr-actor",
+      {"--index", absl::StrCat(index), "--replay", plan.replay_address, "--learner", plan.learner_address},
+      kStopActors);
 }
 
 // What differs between two messages of one type, as "path: before -> now" lines.
@@ -116,6 +183,7 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
   }
   if (options.resume) RETURN_IF_ERROR(CheckRunFolder(RunFolder{options.run_dir}));
   ASSIGN_OR_RETURN(plan.config, LoadForLaunch(options));
+  ASSIGN_OR_RETURN(plan.env, SpecOf(plan.config));
   plan.folder.root = options.run_dir.empty() ? DefaultRunDir(plan.config, now) : options.run_dir;
   plan.config_source = options.config.empty() ? plan.folder.config() : options.config;
   plan.resume = options.resume;
@@ -130,9 +198,8 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
                    Address(plan.config.replay().address(), plan.folder.replay_address(), "replay.address"));
   ASSIGN_OR_RETURN(plan.learner_address, Address(plan.config.learner().address(),
                                                  plan.folder.learner_address(), "learner.address"));
-  const int configured = static_cast<int>(plan.config.actor().processes());
-  plan.actors =
-      configured > 0 ? configured : DefaultActors(static_cast<int>(std::thread::hardware_concurrency()));
+  if (!plan.resume) RETURN_IF_ERROR(CheckSeed(plan.config, plan.env));
+  plan.actors = ActorsFor(plan.config);
   RETURN_IF_ERROR(MakeFolder(plan.folder));
   ASSIGN_OR_RETURN(plan.lock, RunFolderLock::Take(plan.folder));
   std::error_code none_there;
@@ -141,23 +208,11 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
   return plan;
 }
 
-std::vector<ProcessSpec> Processes(const RunPlan& plan, const std::string& programs) {
-  const std::vector<std::string> common = {"--config", plan.folder.config(), "--run-dir", plan.folder.root};
-  const auto spec = [&](const std::string& name, const char* program, std::vector<std::string> arguments,
-                        int rank) {
-    ProcessSpec process;
-    process.name = name;
-    process.log = plan.folder.log(name);
-    process.command = {absl::StrCat(programs, "/", program)};
-    process.command.insert(process.command.end(), common.begin(), common.end());
-    process.command.insert(process.command.end(), arguments.begin(), arguments.end());
-    process.stop_rank = rank;
-    return process;
-  };
+std::vector<ProcessSpec> Services(const RunPlan& plan, const std::string& programs) {
   std::vector<ProcessSpec> all = {
-      spec("replay", "dbr-replay", {"--address", plan.replay_address}, kStopReplay),
-      spec("learner", "dbr-learner", {"--replay", plan.replay_address, "--address", plan.learner_address},
-           kStopLearner)};
+      MakeProcess(plan, programs, "replay", "dbr-replay", {"--address", plan.replay_address}, kStopReplay),
+      MakeProcess(plan, programs, "learner", "dbr-learner",
+                  {"--replay", plan.replay_address, "--address", plan.learner_address}, kStopLearner)};
   all[0].stop_grace = absl::Minutes(2);  // it brings the whole store to disk
   const bool insecure[] = {plan.config.replay().allow_insecure(), plan.config.learner().allow_insecure()};
   for (int i = 0; i < 2; ++i) {
@@ -165,18 +220,16 @@ std::vector<ProcessSpec> Processes(const RunPlan& plan, const std::string& progr
     if (plan.resume) all[i].command.push_back("--resume");
     all[i].restart_arguments = {"--resume"};
   }
-  const std::vector<std::string> services = {"--replay", plan.replay_address, "--learner",
-                                             plan.learner_address};
-  const auto actor = [&](const std::string& name, int index, bool evaluate) {
-    std::vector<std::string> arguments = {"--index", absl::StrCat(index)};
-    arguments.insert(arguments.end(), services.begin(), services.end());
-    if (evaluate) arguments.push_back("--evaluate");
-    return spec(name, "dbr-actor", std::move(arguments), kStopActors);
-  };
-  for (int i = 0; i < plan.actors; ++i)
-    all.push_back(actor(absl::StrCat("actor-", i), i, /*evaluate=*/false));
-  all.push_back(actor("evaluator", 0, /*evaluate=*/true));
+  all.push_back(MakeActor(plan, programs, "evaluator", 0));
+  all.back().command.push_back("--evaluate");
   return all;
+}
+
+std::vector<ProcessSpec> Actors(const RunPlan& plan, const std::string& programs) {
+  std::vector<ProcessSpec> actors;
+  for (int i = 0; i < plan.actors; ++i)
+    actors.push_back(MakeActor(plan, programs, absl::StrCat("actor-", i), i));
+  return actors;
 }
 
 int DefaultActors(int cores) {

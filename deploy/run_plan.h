@@ -9,6 +9,7 @@
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
 #include "core/run_folder.h"
+#include "core/space.h"
 #include "deploy/supervisor.h"
 #include "proto/config.pb.h"
 
@@ -18,6 +19,9 @@ struct LaunchOptions {
   std::string config;                  // a file; empty with `resume`: the run folder's own
   std::vector<std::string> overrides;  // path=value
   std::string run_dir;                 // empty: runs/ENV-ALGORITHM-DATE-TIME
+  std::string seed_buffer;             // replay.seed.path, unless empty
+  std::string seed_layout;             // replay.seed.layout, unless empty
+  bool skip_bad_rows = false;          // sets replay.seed.skip_bad_rows
   bool resume = false;
 };
 
@@ -38,25 +42,27 @@ struct RunPlan {
   std::string config_source;  // the file that the config came from
   RunFolder folder;
   bool resume = false;
-  int actors = 1;
+  EnvSpec env;
+  int actors = 1;  // 0: all training is offline
   std::string replay_address;
   std::string learner_address;
   std::unique_ptr<RunFolderLock> lock;
 };
 
 // Loads and checks the config, makes the folder or checks that it can be continued, and writes the effective
-// config. Errors: InvalidArgument for a bad config, or one that differs from the folder's where that would
-// not continue the same run (each field is named); AlreadyExists where the folder is there and `resume` was
-// not said; NotFound where there is nothing to resume; FailedPrecondition where another launch uses the
-// folder.
+// config. Errors: InvalidArgument for a bad config or seed, or a config that differs from the folder's where
+// that would not continue the same run (each field is named); AlreadyExists where the folder is there and
+// `resume` was not said; NotFound where there is nothing to resume; FailedPrecondition where another launch
+// uses the folder.
 absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now);
 
 // In which order processes are stopped: each saves its state while what it needs is still there.
 enum StopRank { kStopActors, kStopLearner, kStopReplay };
 
-// Replay, learner, actors and evaluator, in the order in which they start. `programs`: the folder of the
-// programs.
-std::vector<ProcessSpec> Processes(const RunPlan& plan, const std::string& programs);
+// Replay, learner and evaluator, in the order in which they start. `programs`: the folder of the programs.
+std::vector<ProcessSpec> Services(const RunPlan& plan, const std::string& programs);
+// The actors, who start after the offline phase.
+std::vector<ProcessSpec> Actors(const RunPlan& plan, const std::string& programs);
 
 // Actor processes for a machine of `cores`: half of them, for the learner, the replay and the evaluator want
 // the others.

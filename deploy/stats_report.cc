@@ -89,10 +89,31 @@ std::string Histogram(const StatsReply& stats) {
   return text;
 }
 
+std::string SourceLine(const char* name, std::uint64_t of_d, std::uint64_t of_plus, std::uint64_t of_minus,
+                       const StatsReply& stats) {
+  return absl::StrCat("  ", PadRight(name, 11), PadLeft(WithCommas(of_d), 13), "  ",
+                      Percent(Ratio(of_d, stats.total())), " of D, ", Percent(Ratio(of_plus, stats.plus())),
+                      " of D+, ", Percent(Ratio(of_minus, stats.minus())), " of D-\n");
+}
+
+std::string Sources(const StatsReply& stats) {
+  std::string text =
+      absl::StrCat("\nsources\n",
+                   SourceLine("online", stats.total() - stats.seed(), stats.plus() - stats.seed_plus(),
+                              stats.minus() - stats.seed_minus(), stats),
+                   SourceLine("seed", stats.seed(), stats.seed_plus(), stats.seed_minus(), stats));
+  if (stats.seed_rows() == 0) return text;
+  absl::StrAppend(&text, "             ", WithCommas(stats.seed_rows()), " transitions came in at ",
+                  Compact(stats.seed_rows_per_second()), " rows/s, ", WithCommas(stats.seed_bad_rows()),
+                  " bad rows left out;\n             ", WithCommas(stats.seed_episodes()),
+                  " whole episodes with a return of ", Fixed(stats.seed_return_mean(), 1), " ± ",
+                  Fixed(stats.seed_return_std(), 1), " (", Fixed(stats.seed_return_min(), 1), " to ",
+                  Fixed(stats.seed_return_max(), 1), ")\n");
+  return text;
+}
+
 std::string Writers(const StatsReply& stats) {
-  std::string text = absl::StrCat("\nsources     online ",
-                                  Percent(1 - Ratio(stats.seed(), std::max<std::uint64_t>(1, stats.total()))),
-                                  ", seed ", Percent(Ratio(stats.seed(), stats.total())), " of D\n");
+  std::string text = Sources(stats);
   if (stats.writers_size() == 0) return text;
   absl::StrAppend(&text, "writers       source      inserted          held          sent twice   refused\n");
   for (const WriterStats& writer : stats.writers()) {
@@ -100,7 +121,7 @@ std::string Writers(const StatsReply& stats) {
                     PadLeft(WithCommas(writer.inserted()), 12), PadLeft(WithCommas(writer.held()), 12), " ",
                     Percent(Ratio(writer.held(), stats.total())),
                     PadLeft(WithCommas(writer.duplicates()), 12), PadLeft(WithCommas(writer.refused()), 10),
-                    writer.connected() ? "" : "   gone", "\n");
+                    writer.connected() || writer.source() == SEED ? "" : "   gone", "\n");
   }
   return text;
 }
@@ -148,7 +169,12 @@ Json WritersJson(const StatsReply& stats) {
 
 Json SourcesJson(const StatsReply& stats) {
   const auto source = [&stats](std::uint64_t total, std::uint64_t plus, std::uint64_t minus) {
-    return Json{{"total", total}, {"plus", plus}, {"minus", minus}, {"share", Ratio(total, stats.total())}};
+    return Json{{"total", total},
+                {"plus", plus},
+                {"minus", minus},
+                {"share", Ratio(total, stats.total())},
+                {"plus_share", Ratio(plus, stats.plus())},
+                {"minus_share", Ratio(minus, stats.minus())}};
   };
   return {{"online", source(stats.total() - stats.seed(), stats.plus() - stats.seed_plus(),
                             stats.minus() - stats.seed_minus())},
@@ -203,6 +229,15 @@ Json ToJson(const StatsReply& stats) {
                {"seed", stats.seed()},
                {"seed_plus", stats.seed_plus()},
                {"seed_minus", stats.seed_minus()},
+               {"seed_rows", stats.seed_rows()},
+               {"seed_bad_rows", stats.seed_bad_rows()},
+               {"seed_episodes", stats.seed_episodes()},
+               {"seed_return_mean", Number(stats.seed_return_mean())},
+               {"seed_return_std", Number(stats.seed_return_std())},
+               {"seed_return_min", Number(stats.seed_return_min())},
+               {"seed_return_max", Number(stats.seed_return_max())},
+               {"seed_rows_per_second", Number(stats.seed_rows_per_second())},
+               {"sampled_offline", stats.sampled_offline()},
                {"capacity", stats.capacity()},
                {"bytes", stats.bytes()},
                {"insert_rate", Number(stats.insert_rate())},
