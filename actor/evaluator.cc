@@ -17,8 +17,6 @@
 namespace dbr {
 namespace {
 
-constexpr int kMaxEpisodes = 1 << 20;  // more would run into the next seed's episodes
-
 // Plays the groups of one evaluation; each thread takes the next group that nobody has taken.
 class GroupPlayer {
  public:

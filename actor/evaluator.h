@@ -12,6 +12,9 @@
 
 namespace dbr {
 
+// Of an evaluation: more would run into the next seed's episodes.
+inline constexpr int kMaxEpisodes = 1 << 20;
+
 struct EvaluationOptions {
   std::string opponent;  // empty where the environment has none
   int episodes = 1000;
@@ -35,14 +38,14 @@ struct EvaluationResult {
   double length_mean = 0;  // steps of the agent
 };
 
-// Plays exactly `episodes` episodes; episode k has the environment seed `seed * 2^20 + k`, so that a
+// Plays exactly `episodes` episodes; episode k has the environment seed `seed * kMaxEpisodes + k`, so that a
 // two-player game starts with each side in turn, the agent first. Episodes run in groups of
 // kEvaluationColumns with one forward pass a step and one random stream a group: the result depends on the
 // policy, the seed and the mode alone, to the last bit on one kind of processor, and the first n episodes of
 // a longer evaluation are those of a shorter one. Blocks until all are played, or ends with Cancelled soon
 // after `cancelled` (may be null) becomes true. Other errors: InvalidArgument for an unknown environment or
 // opponent, a policy that does not fit it, a mode whose networks the policy lacks, or a number of episodes
-// outside [1, 2^20]; Internal for a policy that gives values not finite.
+// outside [1, kMaxEpisodes]; Internal for a policy that gives values not finite.
 inline constexpr int kEvaluationColumns = 64;
 absl::StatusOr<EvaluationResult> Evaluate(const PolicyNetworks& policy, const EvaluationOptions& options,
                                           const std::atomic<bool>* cancelled = nullptr);

@@ -11,12 +11,16 @@
 #include "absl/strings/str_cat.h"
 #include "actor/evaluation_loop.h"
 #include "actor/evaluator.h"
+#include "core/rng.h"
 #include "core/status_macros.h"
 #include "deploy/command_line.h"
+#include "deploy/film.h"
 #include "deploy/interrupt.h"
 #include "deploy/result_tables.h"
 #include "deploy/results.h"
 #include "deploy/terminal.h"
+#include "envs/env.h"
+#include "nn/policy.h"
 
 namespace dbr {
 namespace {
@@ -28,11 +32,42 @@ struct EvaluateFlags {
   std::uint64_t seed = 1;
   std::string mode = "mode";
   bool json = false;
+  std::string film;
 };
+
+// Films the first episode of the evaluation with that seed.
+absl::StatusOr<int> RunFilm(const EvaluateFlags& flags, const PolicyNetworks& policy, ActingMode mode) {
+  ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv({.name = policy.spec().env, .opponents = {}}));
+  PolicySpec expected = policy.spec();
+  expected.env = env->spec().name;
+  expected.observation_size = env->spec().observation_size;
+  expected.actions = env->spec().actions;
+  RETURN_IF_ERROR(CheckSameSpec(expected, policy.spec()));
+  const auto column = [](auto span) {
+    return Eigen::Map<const MatrixX<float>>(span.data(), static_cast<Eigen::Index>(span.size()), 1);
+  };
+  PolicyRunner runner;
+  Rng rng(flags.seed);
+  const ChooseAction choose = [&](absl::Span<const float> observation, absl::Span<const float> mask,
+                                  absl::Span<float> action) {
+    Eigen::Map<MatrixX<float>> actions(action.data(), static_cast<Eigen::Index>(action.size()), 1);
+    return runner.Act(policy, mode, column(observation), column(mask), rng, actions);
+  };
+  const Interrupt interrupt;
+  const absl::StatusOr<FilmSummary> film =
+      FilmEpisode(*env, choose, {.path = flags.film, .seed = flags.seed * kMaxEpisodes}, &interrupt.flag());
+  if (absl::IsCancelled(film.status())) return kInterruptedExit;
+  RETURN_IF_ERROR(film.status());
+  std::printf("%s: %s steps on %s with a return of %.1f, %s frames, %s kB\n", flags.film.c_str(),
+              WithCommas(film->steps).c_str(), env->spec().name.c_str(), film->episode_return,
+              WithCommas(film->frames).c_str(), WithCommas((film->bytes + 999) / 1000).c_str());
+  return 0;
+}
 
 absl::StatusOr<int> RunEvaluate(const EvaluateFlags& flags) {
   ASSIGN_OR_RETURN(const ActingMode mode, ParseActingMode(flags.mode));
   ASSIGN_OR_RETURN(const std::shared_ptr<const PolicyNetworks> policy, OpenPolicy(flags.policy));
+  if (!flags.film.empty()) return RunFilm(flags, *policy, mode);
   std::vector<std::string> opponents = {flags.opponent};
   if (flags.opponent.empty()) opponents = OpponentsToEvaluate(policy->spec().env, {});
   if (flags.json) opponents.resize(1);
@@ -83,11 +118,17 @@ void AddEvaluate(CLI::App* app, int* exit_code) {
       ->type_name("MODE");
   command->add_flag("--json", flags->json,
                     "Print one JSON object: {env, opponent, episodes, seed, score, return}");
+  command
+      ->add_option("--film", flags->film,
+                   "Instead of playing many episodes, draw the first into this animated WebP file")
+      ->type_name("FILE")
+      ->excludes("--json");
   command->footer(
       "Examples:\n"
       "  dbr evaluate --policy runs/quickstart\n"
       "  dbr evaluate --policy runs/quickstart/policy/latest.safetensors --opponent mcts:10 --episodes 2000 "
-      "--json");
+      "--json\n"
+      "  dbr evaluate --policy runs/hopper --film hopper.webp");
   command->callback([flags, exit_code] {
     const absl::StatusOr<int> result = RunEvaluate(*flags);
     *exit_code = result.ok() ? *result : Fail("evaluate", result.status());
