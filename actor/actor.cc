@@ -2,12 +2,14 @@
 
 #include <spdlog/spdlog.h>
 
+#include <filesystem>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "core/rng.h"
+#include "core/safetensors.h"
 #include "core/status_macros.h"
 #include "proto/channel.h"
 #include "proto/grpc_status.h"
@@ -160,12 +162,14 @@ absl::StatusOr<std::unique_ptr<EvaluatorProcess>> EvaluatorProcess::Create(const
 }
 
 EvaluatorProcess::EvaluatorProcess(const ActorOptions& options, const EnvSpec& env)
-    : stub_(Policy::NewStub(MakeChannel(options.learner_address))),
+    : best_policy_(options.best_policy),
+      stub_(Policy::NewStub(MakeChannel(options.learner_address))),
       subscriber_(
           Subscription(options, env, "evaluator", Rng(options.config.seed()).Fork(kEvaluatorStream)())),
       loop_(Evaluating(options.config, env.name),
             {.newest_policy = [this] { return subscriber_.Current(); },
-             .report = [this](const EvaluationReport& report) { return Report(report); }}) {}
+             .report = [this](const EvaluationReport& report) { return Report(report); },
+             .keep_best = [this](const PolicySnapshot& snapshot) { KeepBest(snapshot); }}) {}
 
 absl::Status EvaluatorProcess::Run() {
   return loop_.Run();
@@ -174,6 +178,14 @@ absl::Status EvaluatorProcess::Run() {
 void EvaluatorProcess::Stop() {
   loop_.Close();
   subscriber_.Close();
+}
+
+void EvaluatorProcess::KeepBest(const PolicySnapshot& snapshot) const {
+  if (best_policy_.empty()) return;
+  std::error_code ignored;  // the file then says what is wrong
+  std::filesystem::create_directories(std::filesystem::path(best_policy_).parent_path(), ignored);
+  const absl::Status saved = SavePolicy(snapshot, best_policy_);
+  if (!saved.ok()) spdlog::error("the best policy so far is not kept: {}", std::string(saved.message()));
 }
 
 absl::Status EvaluatorProcess::Report(const EvaluationReport& report) {

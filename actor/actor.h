@@ -23,6 +23,7 @@ struct ActorOptions {
   int index = 0;  // of the actor process
   std::string replay_address;
   std::string learner_address;
+  std::string best_policy = {};  // file for the evaluator's best policy; empty: none is kept
   absl::Duration drain_timeout = absl::Seconds(5);  // for what is still unacknowledged at the end
 };
 
@@ -70,7 +71,9 @@ class EvaluatorProcess {
   EvaluatorProcess(const ActorOptions& options, const EnvSpec& env);
 
   absl::Status Report(const EvaluationReport& report);
+  void KeepBest(const PolicySnapshot& snapshot) const;
 
+  const std::string best_policy_;
   const std::unique_ptr<Policy::Stub> stub_;
   PolicySubscriber subscriber_;
   EvaluationLoop loop_;

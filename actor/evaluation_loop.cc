@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/status_macros.h"
@@ -23,6 +24,18 @@ EvaluationReport ReportOf(const EvaluationResult& result, const PolicySnapshot& 
   report.set_return_mean(result.return_mean);
   report.set_return_stderr(result.return_stderr);
   return report;
+}
+
+void Log(const EvaluationResult& result, const PolicySnapshot& snapshot) {
+  if (std::isfinite(result.score_mean)) {
+    spdlog::info("policy version {} against {}: score {:.3f} +- {:.3f}, return {:.3f} +- {:.3f}",
+                 snapshot.version, result.opponent, result.score_mean, result.score_stderr,
+                 result.return_mean, result.return_stderr);
+  } else {
+    spdlog::info("policy version {} after {} updates: return {:.1f} +- {:.1f} in {:.0f} steps",
+                 snapshot.version, snapshot.updates, result.return_mean, result.return_stderr,
+                 result.length_mean);
+  }
 }
 
 bool IsTransient(const absl::Status& status) {
@@ -71,6 +84,7 @@ absl::Status EvaluationLoop::EvaluateIfNew() {
   if (policy == nullptr) return absl::OkStatus();
   const PolicySnapshot& snapshot = policy->snapshot();
   if (evaluated_ != nullptr && snapshot.version == evaluated_->snapshot().version) return absl::OkStatus();
+  double sum = 0;
   for (const std::string& opponent : options_.opponents) {
     const EvaluationOptions evaluation = {.opponent = opponent,
                                           .episodes = options_.episodes,
@@ -78,15 +92,23 @@ absl::Status EvaluationLoop::EvaluateIfNew() {
                                           .mode = options_.mode,
                                           .threads = options_.threads};
     ASSIGN_OR_RETURN(const EvaluationResult result, Evaluate(*policy, evaluation, &closing_));
-    spdlog::info("policy version {} against {}: score {:.3f} +- {:.3f}, return {:.3f} +- {:.3f}",
-                 snapshot.version, opponent.empty() ? result.env : opponent, result.score_mean,
-                 result.score_stderr, result.return_mean, result.return_stderr);
+    Log(result, snapshot);
+    sum += std::isfinite(result.score_mean) ? result.score_mean : result.return_mean;
     unsent_.push_back(ReportOf(result, snapshot));
     if (unsent_.size() > kMaxUnsent) unsent_.pop_front();
+    if (&opponent == &options_.opponents.back()) {
+      KeepIfBest(sum / static_cast<double>(options_.opponents.size()), snapshot);
+    }
     SendReports();
   }
   evaluated_ = std::move(policy);
   return absl::OkStatus();
+}
+
+void EvaluationLoop::KeepIfBest(double mean, const PolicySnapshot& snapshot) {
+  if (!ports_.keep_best || !(mean > best_)) return;
+  best_ = mean;
+  ports_.keep_best(snapshot);
 }
 
 void EvaluationLoop::SendReports() {

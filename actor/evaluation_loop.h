@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -34,6 +35,9 @@ struct EvaluationLoopOptions {
 struct EvaluationLoopPorts {
   std::function<absl::StatusOr<std::shared_ptr<const PolicyNetworks>>()> newest_policy;  // null: none yet
   std::function<absl::Status(const EvaluationReport&)> report;
+  // Given the policy whose mean over the opponents (of scores, else of returns) is the greatest so far,
+  // before it is reported; null: nobody asks.
+  std::function<void(const PolicySnapshot&)> keep_best = nullptr;
   std::function<absl::Time()> now = absl::Now;
   // Returns at the deadline, or at once after Close(); null: waits for the real time.
   std::function<void(absl::Time)> wait_until = nullptr;
@@ -56,12 +60,14 @@ class EvaluationLoop {
 
  private:
   absl::Status EvaluateIfNew();
+  void KeepIfBest(double mean, const PolicySnapshot& snapshot);
   void SendReports();
 
   const EvaluationLoopOptions options_;
   EvaluationLoopPorts ports_;
   std::shared_ptr<const PolicyNetworks> evaluated_;  // last
   std::deque<EvaluationReport> unsent_;
+  double best_ = -std::numeric_limits<double>::infinity();
   bool said_loss_ = false;
   std::atomic<bool> closing_ = false;
   absl::Mutex mutex_;

@@ -77,7 +77,8 @@ int Main(int argc, char** argv) {
       .config = *config,
       .index = flags.index,
       .replay_address = FirstGiven(flags.replay, config->replay().address(), run.replay_address()),
-      .learner_address = FirstGiven(flags.learner, config->learner().address(), run.learner_address())};
+      .learner_address = FirstGiven(flags.learner, config->learner().address(), run.learner_address()),
+      .best_policy = run.best_policy()};
   return flags.evaluate ? RunProcess(EvaluatorProcess::Create(options)) : RunProcess(Actor::Create(options));
 }
 

@@ -17,6 +17,9 @@ struct RunFolder {
   std::string checkpoints() const { return absl::StrCat(root, "/checkpoints"); }
   std::string policies() const { return absl::StrCat(root, "/policy"); }
   std::string latest_policy() const { return absl::StrCat(root, "/policy/latest.safetensors"); }
+  std::string best_policy() const {
+    return absl::StrCat(root, "/policy/best.safetensors");
+  }  // of evaluations
   std::string logs() const { return absl::StrCat(root, "/logs"); }
   std::string log(absl::string_view process) const { return absl::StrCat(root, "/logs/", process, ".log"); }
   std::string replay_store() const { return absl::StrCat(root, "/replay.store"); }

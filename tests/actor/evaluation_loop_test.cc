@@ -26,6 +26,7 @@ class EvaluationLoopTest : public ::testing::Test {
   EvaluationLoopPorts Ports() {
     return {.newest_policy = [this] { return newest_; },
             .report = [this](const EvaluationReport& report) { return Report(report); },
+            .keep_best = [this](const PolicySnapshot& snapshot) { kept_.push_back(snapshot.version); },
             .now = [this] { return now_; },
             .wait_until =
                 [this](absl::Time deadline) {
@@ -43,6 +44,8 @@ class EvaluationLoopTest : public ::testing::Test {
     ++attempts_;
     if (!learner_.ok()) return learner_;
     reports_.emplace_back(report.policy_version(), report.opponent());
+    scores_[report.policy_version()] += report.score_mean();
+    kept_at_report_.push_back(kept_);
     return absl::OkStatus();
   }
 
@@ -54,6 +57,9 @@ class EvaluationLoopTest : public ::testing::Test {
   absl::Status learner_;
   int attempts_ = 0;
   std::vector<std::pair<std::uint64_t, std::string>> reports_;
+  std::map<std::uint64_t, double> scores_;  // of a version, summed over the opponents
+  std::vector<std::uint64_t> kept_;         // versions, as they were the best
+  std::vector<std::vector<std::uint64_t>> kept_at_report_;
   std::vector<absl::Duration> waits_;
   std::deque<std::function<void()>> script_;
   EvaluationLoop loop_;
@@ -85,6 +91,25 @@ TEST_F(EvaluationLoopTest, KeepsItsDeadlinesAndCatchesUpAfterALongRound) {
   ASSERT_TRUE(loop_.Run().ok());
   // 6 of 10 s went into the first round, none into the second, 22 into the third.
   EXPECT_THAT(waits_, ElementsAre(absl::Seconds(4), absl::Seconds(10), absl::ZeroDuration()));
+}
+
+TEST_F(EvaluationLoopTest, KeepsEachPolicyThatIsBetterThanAllBeforeIt) {
+  Push(1);
+  for (std::uint64_t version = 2; version <= 8; ++version)
+    script_.push_back([this, version] { Push(version); });
+  ASSERT_TRUE(loop_.Run().ok());
+  std::vector<std::uint64_t> expected;
+  double best = -1;
+  for (const auto& [version, score] : scores_) {
+    if (score > best) expected.push_back(version);
+    best = std::max(best, score);
+  }
+  EXPECT_EQ(kept_, expected);
+  EXPECT_GT(kept_.size(), 1u);
+  EXPECT_LT(kept_.size(), 8u);
+  // Kept before the last report of its round, for who acts on that may stop everything.
+  EXPECT_THAT(kept_at_report_[0], IsEmpty());
+  EXPECT_THAT(kept_at_report_[1], ElementsAre(1));
 }
 
 TEST_F(EvaluationLoopTest, KeepsReportsWhileThereIsNoLearner) {
