@@ -37,7 +37,7 @@ struct RecordFlags {
   std::string run;
 };
 
-absl::Status CheckFlags(const RecordFlags& flags) {
+absl::Status CheckFlags(const RecordFlags& flags, const EnvSpec& env) {
   const bool mixed = flags.quality == "mixed", medium = flags.quality == "medium";
   const auto refuse = [](absl::string_view message) { return absl::InvalidArgumentError(message); };
   if (!mixed && !medium && flags.quality != "random") {
@@ -55,7 +55,7 @@ absl::Status CheckFlags(const RecordFlags& flags) {
   if (mixed && flags.run.empty()) {
     return refuse(absl::StrCat(
         "--quality mixed is all that a training run saw: name the run's folder with --run. Such ",
-        "a run is made by: dbr launch deploy/configs/", flags.env, "_medium.textproto"));
+        "a run is made by: dbr launch deploy/configs/", env.name, "_medium.textproto"));
   }
   return absl::OkStatus();
 }
@@ -135,9 +135,9 @@ absl::StatusOr<RunStore> OpenRunOf(const RecordFlags& flags, const EnvSpec& env)
 }
 
 absl::Status Record(const RecordFlags& flags, const Interrupt& interrupt) {
-  RETURN_IF_ERROR(CheckFlags(flags));
   ASSIGN_OR_RETURN(const std::optional<DatasetLayout> layout, ParseLayoutOption("--layout", flags.layout));
   ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv({.name = flags.env, .opponents = {}}));
+  RETURN_IF_ERROR(CheckFlags(flags, env->spec()));
   const DatasetWriterOptions options{.layout = layout.value_or(DatasetLayout::kD4rl), .env = env->spec()};
   if (flags.run.empty()) {
     ASSIGN_OR_RETURN(const std::unique_ptr<DatasetWriter> writer, DatasetWriter::Create(flags.out, options));
