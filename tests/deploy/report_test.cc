@@ -12,6 +12,7 @@
 #include "absl/strings/str_split.h"
 #include "core/file_io.h"
 #include "deploy/progress.h"
+#include "deploy/result_tables.h"
 #include "deploy/results.h"
 #include "deploy/stats_report.h"
 #include "deploy/terminal.h"
@@ -183,15 +184,6 @@ TEST(ResultsTest, TableHasThePaperBesideTheScores) {
   EXPECT_THAT(lines[2], AllOf(HasSubstr("one_ply"), HasSubstr("0.500"), Not(HasSubstr("0.982"))));
   EXPECT_EQ(DisplayWidth(lines[0]), DisplayWidth(lines[1]));
   EXPECT_EQ(DisplayWidth(lines[1]), DisplayWidth(lines[2]));
-}
-
-TEST(ResultsTest, TableOfAnEnvironmentWithoutScoresShowsReturns) {
-  EvaluationResult result = Against("", kNaN);
-  result.env = "hopper";
-  result.return_mean = 1151.6;
-  const std::string table = ResultTable({result});
-  EXPECT_THAT(table,
-              AllOf(HasSubstr("return"), HasSubstr("hopper"), HasSubstr("1151.6"), Not(HasSubstr("paper"))));
 }
 
 TEST(ResultsTest, JsonHasItsStableNames) {

@@ -129,23 +129,33 @@ TEST_F(RunPlanTest, RefusesAnAddressThatNobodyCouldBeTold) {
 TEST_F(RunPlanTest, StartsTheServicesBeforeThoseWhoUseThem) {
   auto plan = PrepareRun(Options({"actor.processes=2"}), kNow);
   ASSERT_TRUE(plan.ok());
+  std::vector<ProcessSpec> all = Services(*plan, "bin");
+  for (ProcessSpec& actor : Actors(*plan, "bin")) all.push_back(std::move(actor));
   std::vector<std::string> names;
-  for (const ProcessSpec& process : Processes(*plan, "bin")) {
+  for (const ProcessSpec& process : all) {
     names.push_back(process.name);
     EXPECT_THAT(process.command, IsSupersetOf({std::string("--config"), plan->folder.config(),
                                                std::string("--run-dir"), run_}));
     EXPECT_THAT(process.command, Not(Contains("--resume")));
   }
-  EXPECT_EQ(names, (std::vector<std::string>{"replay", "learner", "actor-0", "actor-1", "evaluator"}));
+  EXPECT_EQ(names, (std::vector<std::string>{"replay", "learner", "evaluator", "actor-0", "actor-1"}));
+  EXPECT_EQ(all[0].command[0], "bin/dbr-replay");
+  EXPECT_THAT(all[2].command, Contains("--evaluate"));
+  EXPECT_THAT(all[4].command, IsSupersetOf({"--index", "1"}));
+  EXPECT_LT(all[3].stop_rank, all[1].stop_rank);
+  EXPECT_LT(all[1].stop_rank, all[0].stop_rank);
   plan->resume = true;
-  const std::vector<ProcessSpec> resumed = Processes(*plan, "bin");
+  const std::vector<ProcessSpec> resumed = Services(*plan, "bin");
   EXPECT_THAT(resumed[0].command, Contains("--resume"));
   EXPECT_THAT(resumed[1].command, Contains("--resume"));
-  EXPECT_EQ(resumed[0].command[0], "bin/dbr-replay");
-  EXPECT_THAT(resumed[3].command, IsSupersetOf({"--index", "1"}));
-  EXPECT_THAT(resumed[4].command, Contains("--evaluate"));
-  EXPECT_LT(resumed[2].stop_rank, resumed[1].stop_rank);
-  EXPECT_LT(resumed[1].stop_rank, resumed[0].stop_rank);
+  EXPECT_THAT(resumed[2].command, Not(Contains("--resume")));
+}
+
+TEST_F(RunPlanTest, RefusesAnUnknownEnvironmentBeforeItMakesAFolder) {
+  const auto plan = PrepareRun(Options({"env.name=checkers"}), kNow);
+  EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(plan.status().message()), HasSubstr("unknown environment \"checkers\""));
+  EXPECT_FALSE(std::filesystem::exists(run_));
 }
 
 TEST(DefaultActorsTest, LeavesCoresToTheServices) {

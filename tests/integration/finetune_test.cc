@@ -1,0 +1,154 @@
+// Offline training from a seed buffer and fine-tuning online, with the real programs.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "tests/integration/dbr_process.h"
+#include "tests/integration/run_files.h"
+#include "tests/temp_dir.h"
+
+namespace dbr {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using Json = nlohmann::json;
+
+constexpr int kSeedRows = 3000;
+constexpr int kOfflineUpdates = 200;  // of finetune.textproto
+
+class FinetuneTest : public testing::Test {
+ protected:
+  // A seed of hopper with random actions.
+  void SetUp() override {
+    const auto [status, output] =
+        RunProgram("dbr", {"dataset", "record", "--env", "hopper", "--quality", "random", "--steps",
+                           absl::StrCat(kSeedRows), "--out", seed_});
+    ASSERT_EQ(status, 0) << output;
+  }
+
+  std::vector<std::string> Arguments(std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments = {
+        "launch",        absl::StrCat(DBR_SOURCE_DIR, "/tests/integration/finetune.textproto"),
+        "--run-dir",     run_.root,
+        "--seed-buffer", seed_};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  // Numbers of the seed, as the replay server tells them in JSON.
+  static void ExpectWholeSeed(const Json& stats) {
+    ASSERT_TRUE(stats.is_object());
+    EXPECT_EQ(stats["seed_rows"], kSeedRows);
+    EXPECT_EQ(stats["seed"], kSeedRows);
+    EXPECT_EQ(stats["sources"]["seed"]["total"], kSeedRows);
+    EXPECT_GT(stats["seed_episodes"], 0);
+  }
+
+  TempDir folder_;
+  const std::string seed_ = folder_ / "seed.hdf5";
+  const RunFolder run_{folder_ / "run"};
+};
+
+TEST_F(FinetuneTest, GoesOnlineAfterTheOfflinePhaseAndKeepsItsSeedOverAResume) {
+  DbrProcess launch("dbr", Arguments({"--set", "launch.max_steps=1000000"}));
+  ASSERT_TRUE(launch.AwaitOutput("offline phase over")) << launch.output();
+  EXPECT_THAT(launch.output(), AllOf(HasSubstr(absl::StrCat("seed buffer: ", seed_)),
+                                     HasSubstr("the seed holds 3,000 transitions")));
+  // More comes in than the buffer has room for, and the seed stays.
+  Json stats;
+  ASSERT_TRUE(launch.Await([&] {
+    stats = Stats(run_);
+    return stats.is_object() && stats["evicted"] > 0;
+  })) << launch.output();
+  ExpectWholeSeed(stats);
+  EXPECT_EQ(stats["total"], 4000);
+  EXPECT_EQ(stats["sources"]["seed"]["share"], 0.75);
+  EXPECT_EQ(stats["sources"]["online"]["total"], 1000);
+  EXPECT_GE(stats["sampled_offline"], kOfflineUpdates * 32);
+  EXPECT_GT(stats["sources"]["seed"]["plus"], 0);
+  EXPECT_GT(stats["sources"]["seed"]["minus"], 0);
+  EXPECT_LE(stats["samples_per_insert"], 96 + 9.6) << "the offline phase does not count";
+  launch.Signal(SIGINT);
+  EXPECT_EQ(launch.Wait(), 130) << launch.output();
+  const Json first = Summary(run_);
+  EXPECT_EQ(first["ended"], "interrupted");
+  EXPECT_GT(first["transitions"], 1000);
+  EXPECT_GE(first["updates"], kOfflineUpdates);
+  EXPECT_EQ(first["restarts"], 0);
+  EXPECT_EQ(first["seed_buffer"]["path"], seed_);
+  EXPECT_EQ(first["returns"]["seed"], stats["seed_return_mean"]);
+  EXPECT_TRUE(first["returns"]["end"].is_null());
+
+  const std::uint64_t steps = first["transitions"].get<std::uint64_t>() + 300;
+  const auto [status, output] = RunProgram("dbr", {"launch", "--resume", "--run-dir", run_.root, "--set",
+                                                   absl::StrCat("launch.max_steps=", steps)});
+  ASSERT_EQ(status, 0) << output;
+  EXPECT_THAT(output,
+              AllOf(HasSubstr("reached max_steps"), HasSubstr("of the seed"), HasSubstr("at the end")));
+  const Json second = Summary(run_);
+  EXPECT_EQ(second["ended"], "max_steps");
+  EXPECT_EQ(second["launches"], 2);
+  EXPECT_GE(second["transitions"], steps);
+  EXPECT_GT(second["updates"], first["updates"]);
+  EXPECT_EQ(second["seed_buffer"]["rows"], kSeedRows);
+  EXPECT_GE(second["evaluations"].size(), first["evaluations"].size());
+  EXPECT_TRUE(second["returns"]["end"]["mean"].is_number());
+  EXPECT_EQ(second["final"][0]["episodes"], 4);
+  EXPECT_THAT(Contents(run_.log("replay")), HasSubstr("resumed"));
+  EXPECT_THAT(Contents(run_.root + "/results.txt"), AllOf(HasSubstr("hopper"), HasSubstr("mean returns")));
+  EXPECT_THAT(ProcessesOf("dbr", run_.root), IsEmpty());
+}
+
+TEST_F(FinetuneTest, ResumesInTheOfflinePhase) {
+  DbrProcess launch("dbr", Arguments({"--set", "learner.offline_updates=1000000"}));
+  ASSERT_TRUE(launch.Await([&] { return Counter(run_, "relabelled") > 0; })) << launch.output();
+  launch.Signal(SIGINT);
+  EXPECT_EQ(launch.Wait(), 130) << launch.output();
+  const Json first = Summary(run_);
+  EXPECT_EQ(first["ended"], "interrupted");
+  EXPECT_EQ(first["transitions"], 0);
+  EXPECT_FALSE(std::filesystem::exists(run_.log("actor-0")));
+
+  const auto [status, output] =
+      RunProgram("dbr", {"launch", "--resume", "--run-dir", run_.root, "--set", "learner.offline_updates=200",
+                         "--set", "launch.max_steps=300"});
+  ASSERT_EQ(status, 0) << output;
+  EXPECT_THAT(output, HasSubstr("offline phase over"));
+  const Json second = Summary(run_);
+  EXPECT_EQ(second["ended"], "max_steps");
+  EXPECT_GE(second["updates"], first["updates"]);
+  EXPECT_EQ(second["seed_buffer"]["rows"], kSeedRows);
+}
+
+TEST_F(FinetuneTest, OfflineAloneStartsNoActors) {
+  const auto [status, output] = RunProgram("dbr", Arguments({"--set", "learner.max_updates=200"}));
+  ASSERT_EQ(status, 0) << output;
+  EXPECT_THAT(output,
+              AllOf(HasSubstr("no actors"), HasSubstr("reached max_updates"), Not(HasSubstr("lowest"))));
+  EXPECT_FALSE(std::filesystem::exists(run_.log("actor-0")));
+  const Json summary = Summary(run_);
+  EXPECT_EQ(summary["updates"], kOfflineUpdates);
+  EXPECT_EQ(summary["transitions"], 0);
+  EXPECT_EQ(summary["games"], 0);
+  EXPECT_TRUE(summary["returns"]["lowest_online"].is_null());
+}
+
+TEST_F(FinetuneTest, StopsWhereAnEvaluationReachesTheReturn) {
+  const auto [status, output] =
+      RunProgram("dbr", Arguments({"--set", "launch.stop_at_return=1", "--set", "launch.max_steps=0", "--set",
+                                   "learner.offline_updates=0"}));
+  ASSERT_EQ(status, 0) << output;
+  EXPECT_EQ(Summary(run_)["ended"], "stop_at_return");
+  EXPECT_GE(Summary(run_)["evaluations"][0]["return_mean"], 1);
+}
+
+}  // namespace
+}  // namespace dbr
