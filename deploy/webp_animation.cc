@@ -8,7 +8,7 @@ namespace {
 constexpr float kQuality = 30;  // of 100; flat drawings bear it
 // What differs little from the frame before is not drawn again and leaves traces; whole frames wipe them
 // away.
-constexpr int kFramesBetweenWholeOnes = 30;
+constexpr int kFramesBetweenWholeOnes = 8;
 
 }  // namespace
 
