@@ -2,10 +2,11 @@
 
 #include <cmath>
 #include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 #include "core/file_io.h"
 #include "core/status_macros.h"
@@ -33,6 +34,12 @@ std::vector<std::string> NamesWithFigure() {
     if ((*env)->GetFigure(&figure)) names.push_back(name);
   }
   return names;
+}
+
+absl::Status NoFigure(const std::string& env) {
+  return absl::InvalidArgumentError(
+      absl::StrCat("environment ", env,
+                   " has no figure to film; expected one of: ", absl::StrJoin(NamesWithFigure(), ", ")));
 }
 
 std::string HowItEnded(const StepResult& result) {
@@ -70,11 +77,7 @@ absl::StatusOr<FilmSummary> FilmEpisode(Env& env, const ChooseAction& choose, co
   std::vector<float> action(spec.actions.width());
   env.Reset(options.seed, absl::MakeSpan(observation), absl::MakeSpan(mask));
   Figure figure;
-  if (!env.GetFigure(&figure)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("environment ", spec.name,
-                     " has no figure to film; expected one of: ", absl::StrJoin(NamesWithFigure(), ", ")));
-  }
+  if (!env.GetFigure(&figure)) return NoFigure(spec.name);
   ASSIGN_OR_RETURN(std::unique_ptr<WebpAnimation> animation,
                    WebpAnimation::Create(FilmCanvas::kWidth, FilmCanvas::kHeight));
   Film film(std::move(animation));
@@ -89,7 +92,7 @@ absl::StatusOr<FilmSummary> FilmEpisode(Env& env, const ChooseAction& choose, co
     ++summary.steps;
     summary.episode_return += result.reward;
     if (summary.steps % kStepsAFrame != 0 && !result.done()) continue;
-    env.GetFigure(&figure);
+    if (!result.broken) env.GetFigure(&figure);  // a broken world has no place to draw
     speed_m_s += 0.3 * (figure.speed_m_s - speed_m_s);
     if (film.frames() % kFramesANumber == 0 || result.done()) {
       caption.step = summary.steps;

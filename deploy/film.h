@@ -29,7 +29,7 @@ struct FilmSummary {
   std::size_t bytes = 0;
 };
 
-// Plays in real time, every third step a frame, however long the episode. Blocks for some seconds; ends with
+// Plays in real time, every fourth step a frame, however long the episode. Blocks for some seconds; ends with
 // Cancelled soon after `cancelled` (may be null) becomes true. Other errors: InvalidArgument for an
 // environment without a figure, with the names of those that have one; the chooser's; WriteFileAtomically's;
 // Internal from the encoder.

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <set>
 #include <string>
@@ -116,6 +117,17 @@ TEST_F(FilmTest, ErrorsOfTheChooserAndOfTheFolderAreTold) {
   const absl::Status status =
       FilmEpisode(*Make("hopper"), Swing(), {.path = folder_ / "nowhere/film.webp"}).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
+}
+
+TEST_F(FilmTest, AWorldThatBreaksEndsTheFilmWithItsLastSoundPicture) {
+  const ChooseAction fail = [step = 0](auto, auto, absl::Span<float> action) mutable {
+    std::fill(action.begin(), action.end(), ++step < 8 ? 0.2f : std::numeric_limits<float>::quiet_NaN());
+    return absl::OkStatus();
+  };
+  const absl::StatusOr<FilmSummary> film = FilmEpisode(*Make("ant"), fail, {.path = Path(), .seed = 1});
+  ASSERT_TRUE(film.ok()) << film.status();
+  EXPECT_EQ(film->steps, 8);
+  EXPECT_GT(Play(Path()).pictures.size(), 1u);
 }
 
 TEST_F(FilmTest, ACancelledFilmLeavesNoFile) {
