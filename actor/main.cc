@@ -12,6 +12,7 @@
 #include "core/shutdown.h"
 #include "nn/blas_threads.h"
 #include "proto/config_file.h"
+#include "proto/service_main.h"
 
 namespace dbr {
 namespace {
@@ -35,11 +36,6 @@ void Declare(CLI::App* app, Flags* flags) {
                   "Learner (default: the config's, else the run folder's socket)");
   app->add_flag("--evaluate", flags->evaluate, "Be the evaluator: play evaluation episodes, insert nothing");
   app->footer("Example: dbr-actor --config deploy/configs/connect4.textproto --run-dir runs/first --index 0");
-}
-
-std::string FirstGiven(const std::string& flag, const std::string& configured, const std::string& standard) {
-  if (!flag.empty()) return flag;
-  return configured.empty() ? standard : configured;
 }
 
 int Fail(const absl::Status& status, int exit_code) {
@@ -76,8 +72,8 @@ int Main(int argc, char** argv) {
   const ActorOptions options = {
       .config = *config,
       .index = flags.index,
-      .replay_address = FirstGiven(flags.replay, config->replay().address(), run.replay_address()),
-      .learner_address = FirstGiven(flags.learner, config->learner().address(), run.learner_address()),
+      .replay_address = ChooseAddress(flags.replay, config->replay().address(), run.replay_address()),
+      .learner_address = ChooseAddress(flags.learner, config->learner().address(), run.learner_address()),
       .best_policy = run.best_policy()};
   return flags.evaluate ? RunProcess(EvaluatorProcess::Create(options)) : RunProcess(Actor::Create(options));
 }

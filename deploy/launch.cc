@@ -23,6 +23,7 @@ namespace {
 constexpr absl::Duration kAskEvery = absl::Milliseconds(500);
 constexpr absl::Duration kLineEvery = absl::Seconds(10);     // where the output is no terminal
 constexpr absl::Duration kServingWithin = absl::Minutes(2);  // a large store takes its time to be opened
+constexpr absl::Duration kServingSeedWithin = absl::Minutes(10);
 constexpr absl::Duration kFirstAnswerWithin = absl::Seconds(10);
 constexpr absl::Duration kLastAnswerWithin = absl::Seconds(2);
 
@@ -135,11 +136,13 @@ absl::Status Launch::StartAll() {
   };
   ASSIGN_OR_RETURN(supervisor_, Supervisor::Create(std::move(options)));
   supervisor_->set_restarting(false);
+  const absl::Duration replay_within =
+      summary_.seed_buffer.path.empty() ? kServingWithin : kServingSeedWithin;
   for (ProcessSpec& process : Services(plan_, programs_)) {
     const std::string name = process.name;
     RETURN_IF_ERROR(supervisor_->Start(std::move(process)));
-    if (name == "replay") RETURN_IF_ERROR(WaitUntilServing(name, plan_.replay_address));
-    if (name == "learner") RETURN_IF_ERROR(WaitUntilServing(name, plan_.learner_address));
+    if (name == "replay") RETURN_IF_ERROR(WaitUntilServing(name, plan_.replay_address, replay_within));
+    if (name == "learner") RETURN_IF_ERROR(WaitUntilServing(name, plan_.learner_address, kServingWithin));
     if (supervisor_->stop_signals() > 0) return absl::OkStatus();
   }
   if (summary_.offline_updates == 0) RETURN_IF_ERROR(StartActors());
@@ -171,14 +174,15 @@ void Launch::TellOfTheSeed() {
 }
 
 // OK also where a stop signal came first.
-absl::Status Launch::WaitUntilServing(const std::string& name, const std::string& address) {
-  const HealthCheck check(address, kServingWithin, [supervisor = supervisor_.get()] { supervisor->Wake(); });
+absl::Status Launch::WaitUntilServing(const std::string& name, const std::string& address,
+                                      absl::Duration within) {
+  const HealthCheck check(address, within, [supervisor = supervisor_.get()] { supervisor->Wake(); });
   while (supervisor_->stop_signals() == 0) {
     if (const std::optional<absl::Status> result = check.result()) {
       if (result->ok()) return absl::OkStatus();
       return absl::Status(result->code(),
-                          absl::StrCat(name, " does not serve within ", absl::FormatDuration(kServingWithin),
-                                       ": ", result->message(), "\n  its log: ", plan_.folder.log(name)));
+                          absl::StrCat(name, " does not serve within ", absl::FormatDuration(within), ": ",
+                                       result->message(), "\n  its log: ", plan_.folder.log(name)));
     }
     RETURN_IF_ERROR(supervisor_->Wait(absl::InfiniteFuture()));
   }

@@ -39,7 +39,7 @@ class Launch {
   absl::Status StartAll();
   absl::Status StartActors();
   void TellOfTheSeed();
-  absl::Status WaitUntilServing(const std::string& name, const std::string& address);
+  absl::Status WaitUntilServing(const std::string& name, const std::string& address, absl::Duration within);
   // Watching (launch_watch.cc).
   absl::Status Train();
   void Observe(absl::Time now);

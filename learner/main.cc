@@ -19,6 +19,7 @@
 #include "nn/blas_threads.h"
 #include "proto/config_file.h"
 #include "proto/server.h"
+#include "proto/service_main.h"
 
 namespace dbr {
 namespace {
@@ -27,13 +28,8 @@ constexpr absl::Duration kMetricsFlush = absl::Seconds(2);
 constexpr absl::Duration kFirstStatsTimeout = absl::Seconds(5);
 constexpr absl::Duration kRolloutPeriod = absl::Seconds(5);
 
-struct Arguments {
-  std::string config_path;
-  RunFolder folder;
+struct Arguments : ServiceArguments {
   std::string replay_address;
-  std::string address;
-  bool resume = false;
-  bool allow_insecure = false;
 };
 
 absl::StatusOr<AlgorithmSpec> MakeSpec(const Config& config) {
@@ -128,16 +124,10 @@ int Main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("learner"));
   CLI::App app("Trains an algorithm from a replay server and serves its policy.", "dbr-learner");
   Arguments arguments;
-  app.add_option("--config", arguments.config_path, "Text-format config")->required();
-  app.add_option("--run-dir", arguments.folder.root, "Folder of the run: checkpoints, policy, metrics")
-      ->required();
+  AddServiceFlags("Folder of the run: checkpoints, policy, metrics",
+                  "Continue from the newest checkpoint of the run folder", &arguments, &app);
   app.add_option("--replay", arguments.replay_address,
-                 "Address of the replay server (default: in the run folder)");
-  app.add_option("--address", arguments.address,
-                 "Address to serve on (default: a unix socket in the run folder)");
-  app.add_flag("--resume", arguments.resume, "Continue from the newest checkpoint of the run folder");
-  app.add_flag("--allow-insecure", arguments.allow_insecure,
-               "Serve an address that other machines can reach");
+                 "Address of the replay server (default: the config's, else in the run folder)");
   app.footer("Example: dbr-learner --config deploy/configs/connect4.textproto --run-dir runs/mine");
   try {
     app.parse(argc, argv);
@@ -151,11 +141,10 @@ int Main(int argc, char** argv) {
   }
   std::error_code error;
   std::filesystem::create_directories(arguments.folder.root, error);
-  const auto choose = [](std::string* address, const std::string& configured, const std::string& fallback) {
-    if (address->empty()) *address = configured.empty() ? fallback : configured;
-  };
-  choose(&arguments.replay_address, config->replay().address(), arguments.folder.replay_address());
-  choose(&arguments.address, config->learner().address(), arguments.folder.learner_address());
+  const RunFolder& folder = arguments.folder;
+  arguments.replay_address =
+      ChooseAddress(arguments.replay_address, config->replay().address(), folder.replay_address());
+  arguments.address = ChooseAddress(arguments.address, config->learner().address(), folder.learner_address());
   if (const absl::Status status = Serve(arguments, *config); !status.ok()) {
     spdlog::error("{}", std::string(status.message()));
     return absl::IsInvalidArgument(status) ? 2 : 1;

@@ -12,20 +12,13 @@
 #include "core/status_macros.h"
 #include "envs/env.h"
 #include "proto/config_file.h"
+#include "proto/service_main.h"
 #include "replay/replay_server.h"
 
 namespace dbr {
 namespace {
 
-struct Arguments {
-  std::string config_path;
-  RunFolder folder;
-  std::string address;
-  bool resume = false;
-  bool allow_insecure = false;
-};
-
-absl::StatusOr<ReplayServerOptions> MakeOptions(const Arguments& arguments, const Config& config) {
+absl::StatusOr<ReplayServerOptions> MakeOptions(const ServiceArguments& arguments, const Config& config) {
   ASSIGN_OR_RETURN(
       const std::unique_ptr<Env> env,
       MakeEnv({.name = config.env().name(),
@@ -34,8 +27,8 @@ absl::StatusOr<ReplayServerOptions> MakeOptions(const Arguments& arguments, cons
   options.store.env = env->spec().name;
   options.store.path = arguments.folder.replay_store();
   options.store.resume = arguments.resume;
-  if (!arguments.address.empty()) options.server.address = arguments.address;
-  if (options.server.address.empty()) options.server.address = arguments.folder.replay_address();
+  options.server.address =
+      ChooseAddress(arguments.address, config.replay().address(), arguments.folder.replay_address());
   options.server.allow_insecure |= arguments.allow_insecure;
   return options;
 }
@@ -48,7 +41,7 @@ void LogSeed(const std::string& path, const SeedRecord& seed) {
     spdlog::warn("seed {}: {} rows with values that are not finite are left out", path, seed.bad_rows);
 }
 
-absl::Status Serve(const Arguments& arguments, const Config& config) {
+absl::Status Serve(const ServiceArguments& arguments, const Config& config) {
   ASSIGN_OR_RETURN(const ReplayServerOptions options, MakeOptions(arguments, config));
   absl::Notification stop;
   const ShutdownWatcher watcher([&stop] {
@@ -69,14 +62,9 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
 int Main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("replay"));
   CLI::App app("Keeps the transitions of a run and serves them.", "dbr-replay");
-  Arguments arguments;
-  app.add_option("--config", arguments.config_path, "Text-format config")->required();
-  app.add_option("--run-dir", arguments.folder.root, "Folder of the run, where the store lies")->required();
-  app.add_option("--address", arguments.address,
-                 "Address to serve on (default: a unix socket in the run folder)");
-  app.add_flag("--resume", arguments.resume, "Continue the store that the run folder has");
-  app.add_flag("--allow-insecure", arguments.allow_insecure,
-               "Serve an address that other machines can reach");
+  ServiceArguments arguments;
+  AddServiceFlags("Folder of the run, where the store lies", "Continue the store that the run folder has",
+                  &arguments, &app);
   app.footer("Example: dbr-replay --config deploy/configs/connect4.textproto --run-dir runs/mine");
   try {
     app.parse(argc, argv);

@@ -1,0 +1,39 @@
+// What the mains of the service programs share: their flags and how an address is chosen.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "core/run_folder.h"
+
+namespace dbr {
+
+struct ServiceArguments {
+  std::string config_path;
+  RunFolder folder;
+  std::string address;  // to serve on; empty: the config's, else the run folder's socket
+  bool resume = false;
+  bool allow_insecure = false;
+};
+
+// `app` fills `arguments`, which outlive it, while it parses. The two texts say for --help what lies in the
+// run folder and what --resume continues.
+inline void AddServiceFlags(const std::string& folder_holds, const std::string& resumes,
+                            ServiceArguments* arguments, CLI::App* app) {
+  app->add_option("--config", arguments->config_path, "Text-format config")->required();
+  app->add_option("--run-dir", arguments->folder.root, folder_holds)->required();
+  app->add_option("--address", arguments->address,
+                  "Address to serve on (default: the config's, else a unix socket in the run folder)");
+  app->add_flag("--resume", arguments->resume, resumes);
+  app->add_flag("--allow-insecure", arguments->allow_insecure,
+                "Serve an address that other machines can reach");
+}
+
+// An address as the flag gives it, else as the config does, else the run folder's.
+inline std::string ChooseAddress(const std::string& flag, const std::string& configured,
+                                 const std::string& otherwise) {
+  if (!flag.empty()) return flag;
+  return configured.empty() ? otherwise : configured;
+}
+
+}  // namespace dbr
