@@ -181,6 +181,17 @@ Json SourcesJson(const StatsReply& stats) {
           {"seed", source(stats.seed(), stats.seed_plus(), stats.seed_minus())}};
 }
 
+Json SeedJson(const StatsReply& stats) {
+  return {{"seed_rows", stats.seed_rows()},
+          {"seed_bad_rows", stats.seed_bad_rows()},
+          {"seed_episodes", stats.seed_episodes()},
+          {"seed_return_mean", Number(stats.seed_return_mean())},
+          {"seed_return_std", Number(stats.seed_return_std())},
+          {"seed_return_min", Number(stats.seed_return_min())},
+          {"seed_return_max", Number(stats.seed_return_max())},
+          {"seed_rows_per_second", Number(stats.seed_rows_per_second())}};
+}
+
 Json EdgesJson(const StatsReply& stats) {
   Json list = Json::array();
   for (const double edge : stats.advantage_edges()) list.push_back(Number(edge));
@@ -229,14 +240,6 @@ Json ToJson(const StatsReply& stats) {
                {"seed", stats.seed()},
                {"seed_plus", stats.seed_plus()},
                {"seed_minus", stats.seed_minus()},
-               {"seed_rows", stats.seed_rows()},
-               {"seed_bad_rows", stats.seed_bad_rows()},
-               {"seed_episodes", stats.seed_episodes()},
-               {"seed_return_mean", Number(stats.seed_return_mean())},
-               {"seed_return_std", Number(stats.seed_return_std())},
-               {"seed_return_min", Number(stats.seed_return_min())},
-               {"seed_return_max", Number(stats.seed_return_max())},
-               {"seed_rows_per_second", Number(stats.seed_rows_per_second())},
                {"sampled_offline", stats.sampled_offline()},
                {"capacity", stats.capacity()},
                {"bytes", stats.bytes()},
@@ -253,6 +256,7 @@ Json ToJson(const StatsReply& stats) {
                {"uptime_s", Number(stats.uptime_s())}};
   json["advantage_edges"] = EdgesJson(stats);
   json["advantage_histogram"] = stats.advantage_histogram();
+  json.update(SeedJson(stats));
   json["sources"] = SourcesJson(stats);
   json["writers"] = WritersJson(stats);
   json["blocked"] = BlockedJson(stats);

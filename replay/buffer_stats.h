@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "replay/seed_record.h"
-#include "replay/transition_store.h"
+#include "replay/store_counters.h"
 #include "replay/writer_table.h"
 
 namespace dbr {

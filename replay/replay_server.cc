@@ -40,6 +40,7 @@ SeedOptions SeedOptionsFrom(const Config& config) {
           .discount = static_cast<float>(config.algorithm().discount()),
           .evict = seed.evict(),
           .skip_bad_rows = seed.skip_bad_rows(),
+          .min_rows = config.learner().offline_updates() > 0 ? config.replay().min_size() : 0,
           .others_will_come = !TrainsOfflineAlone(config)};
 }
 

@@ -12,6 +12,14 @@
 namespace dbr {
 namespace {
 
+absl::Status CheckEnough(const SeedOptions& options, std::uint64_t transitions) {
+  if (transitions > 0 && transitions >= options.min_rows) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("replay.seed.path: expected at least ", std::max<std::uint64_t>(1, options.min_rows),
+                   " transitions (replay.min_size, before which nothing is drawn), found ", transitions,
+                   " in ", options.path, ". Lower replay.min_size or take a larger seed."));
+}
+
 absl::Status CheckRoom(const SeedOptions& options, std::uint64_t transitions, std::uint64_t capacity) {
   if (transitions > capacity) {
     return absl::InvalidArgumentError(absl::StrCat("replay.seed.path: the seed ", options.path, " has ",
@@ -25,7 +33,7 @@ absl::Status CheckRoom(const SeedOptions& options, std::uint64_t transitions, st
         " places of the buffer and is never evicted, so that there is none for what the actors do. Raise "
         "replay.capacity, or set replay.seed.evict: true."));
   }
-  return absl::OkStatus();
+  return CheckEnough(options, transitions);
 }
 
 // A reader of the file, whose transitions fit.
@@ -86,10 +94,8 @@ absl::StatusOr<SeedRecord> ImportSeed(const SeedOptions& options, PartitionedBuf
     RETURN_IF_ERROR(
         buffer->InsertSeed(chunk.rows().subspan(skipped * static_cast<std::uint64_t>(layout.stride()))));
   }
-  if (reader->facts().transitions == 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("replay.seed.path: expected transitions in ", options.path, ", found none"));
-  }
+  // Bad rows may have been left out.
+  RETURN_IF_ERROR(CheckEnough(options, static_cast<std::uint64_t>(reader->facts().transitions)));
   RETURN_IF_ERROR(buffer->CompleteSeed(RecordOf(reader->facts(), absl::Now() - start), !options.evict));
   return buffer->Stats().seed_record;
 }

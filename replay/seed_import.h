@@ -19,6 +19,7 @@ struct SeedOptions {
   float discount = 0.99f;      // of transitions after which the task goes on
   bool evict = false;          // let the seed's rows make room as others do
   bool skip_bad_rows = false;  // else a row with a value that is not finite is an error
+  std::uint64_t min_rows = 0;  // what the first draw waits for, where there will be nothing but the seed
   bool others_will_come = true;  // then a seed that is never evicted must leave room
 };
 

@@ -10,6 +10,7 @@
 #include "absl/status/statusor.h"
 #include "core/transition.h"
 #include "replay/seed_record.h"
+#include "replay/store_counters.h"
 #include "replay/store_file.h"
 #include "replay/writer_table.h"
 
@@ -32,20 +33,6 @@ struct RowLabels {
   float advantage = kUnjudged;
   std::uint32_t writer = 0;  // place in the table of writers
   Source source = Source::kOnline;
-};
-
-// Counters that live as long as the store.
-struct StoreCounters {
-  std::uint64_t sampled;
-  std::uint64_t sampled_offline;  // of them, before the first row that is no seed
-  std::uint64_t relabelled;
-  std::uint64_t relabel_evicted;
-  std::uint64_t relabel_stale;
-  std::uint64_t relabel_refused;
-  std::uint64_t refused;
-  std::uint64_t duplicates;
-  std::uint64_t newest_label;  // greatest critic version of a label
-  std::uint64_t episodes;
 };
 
 // Rows enter at the newest end and leave at the oldest. Each has a key, counted from 1 and never used again,

@@ -43,7 +43,7 @@ class SeedPlanTest : public testing::Test {
  protected:
   SeedPlanTest() {
     EXPECT_TRUE(WriteFileAtomically(config_,
-                                    "env { name: 'hopper' } replay { capacity: 5000 } "
+                                    "env { name: 'hopper' } replay { capacity: 5000 min_size: 10 } "
                                     "learner { offline_updates: 100 } actor { processes: 2 }")
                     .ok());
     WriteSeed(seed_);
@@ -114,6 +114,7 @@ TEST_F(SeedPlanTest, ABadSeedIsRefusedBeforeAFolderIsMade) {
               AllOf(HasSubstr("has 50 transitions"), HasSubstr("room for 49")));
   EXPECT_THAT(Refusal(Options(seed_, {"replay.capacity=50", "replay.min_size=1"})),
               HasSubstr("replay.seed.evict"));
+  EXPECT_THAT(Refusal(Options(seed_, {"replay.min_size=51"})), HasSubstr("expected at least 51"));
   WriteSeed(seed_, 22);
   EXPECT_THAT(Refusal(Options(seed_)),
               AllOf(HasSubstr("expected observations of 15"), HasSubstr("found 22")));

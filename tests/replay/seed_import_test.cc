@@ -170,6 +170,15 @@ TEST_F(SeedImportTest, ASeedThatFillsTheBufferMustLeaveRoomForActors) {
   EXPECT_EQ(Stats().total(), rows());
 }
 
+TEST_F(SeedImportTest, ASeedTooSmallForTheFirstDrawIsRefusedWhereItIsAlone) {
+  options_.seed.min_rows = rows() + 1;
+  EXPECT_THAT(StartError().ToString(),
+              AllOf(HasSubstr(absl::StrCat("at least ", rows() + 1)), HasSubstr("replay.min_size"),
+                    HasSubstr(absl::StrCat("found ", rows()))));
+  options_.seed.min_rows = rows();
+  Start();
+}
+
 TEST_F(SeedImportTest, AnotherRobotsSeedIsRefused) {
   options_.store.layout.observation_width = 15;
   const absl::Status status = StartError();
@@ -231,7 +240,9 @@ TEST(ReplayServerOptionsTest, TakesTheSeedFromTheConfig) {
   EXPECT_TRUE(options.seed.skip_bad_rows);
   EXPECT_TRUE(options.seed.others_will_come);
   EXPECT_EQ(options.buffer.seed_share, 0.25);
+  EXPECT_EQ(options.seed.min_rows, 0u);
   config.mutable_learner()->set_offline_updates(100);
+  EXPECT_EQ(OptionsFrom(config, kLayout).seed.min_rows, 1000u);
   config.mutable_learner()->set_max_updates(100);
   EXPECT_FALSE(OptionsFrom(config, kLayout).seed.others_will_come);
   config.mutable_learner()->set_max_updates(101);
