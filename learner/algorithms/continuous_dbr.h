@@ -6,11 +6,8 @@
 
 #include "core/rng.h"
 #include "learner/algorithm.h"
+#include "learner/parts/dual_behavior_networks.h"
 #include "learner/parts/dual_behavior_objective.h"
-#include "learner/parts/multiplier.h"
-#include "learner/parts/pair_runner.h"
-#include "learner/parts/trained_network.h"
-#include "learner/parts/twin_critic.h"
 
 namespace dbr {
 
@@ -44,37 +41,30 @@ class ContinuousDbr {
   absl::Status Load(const TensorFile& file);
 
  private:
-  // A behaviour policy with the workspaces of its fit.
+  // Workspaces of a behaviour policy.
   struct Behavior {
-    TrainedNetwork<Scalar> network;
-    GaussianHead<Scalar> head = {};  // at the states of the newest use
-    VectorX<Scalar> log_prob = {};
-    GaussianGradient<Scalar> gradient = {};
-    MatrixX<Scalar> d_output = {};
+    GaussianHead<Scalar> head;  // at the states of the newest use
+    VectorX<Scalar> log_prob;
+    GaussianGradient<Scalar> gradient;
+    MatrixX<Scalar> d_output;
     Scalar loss = 0;  // mean of -log beta(a|s) in the newest fit
   };
 
-  void SetLearningRate(double learning_rate);
-  static void FitBehavior(const BasicBatch<Scalar>& batch, Behavior* behavior);
+  static void FitBehavior(const BasicBatch<Scalar>& batch, TrainedNetwork<Scalar>* network,
+                          Behavior* behavior);
   void ComputeTargets(const BasicBatch<Scalar>& batch);
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
   PolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
   void DrawDivergenceNoise(Eigen::Index n);
-  absl::Status Report(Scalar critic_loss, const PolicyLoss<Scalar>& policy_loss);
 
   AlgorithmSpec spec_;
   BatchNeeds needs_;
   PolicyLossOptions options_;
   Rng rng_;
   MlpShape policy_shape_, critic_shape_;
-  PairRunner runner_;
-  TrainedNetwork<Scalar> policy_;
-  TwinCritic<Scalar> critics_;
-  Behavior beta_plus_;
-  Behavior beta_minus_;
-  Multiplier<Scalar> multiplier_;
-  std::uint64_t updates_ = 0;
+  DualBehaviorNetworks<Scalar> networks_;
 
+  Behavior beta_plus_, beta_minus_;
   GaussianHead<Scalar> pi_, next_pi_;
   SampledActions<Scalar> next_draws_;
   DualBehaviorObjective<Scalar> objective_;

@@ -6,10 +6,7 @@
 
 #include "learner/algorithm.h"
 #include "learner/parts/discrete_losses.h"
-#include "learner/parts/multiplier.h"
-#include "learner/parts/pair_runner.h"
-#include "learner/parts/trained_network.h"
-#include "learner/parts/twin_critic.h"
+#include "learner/parts/dual_behavior_networks.h"
 
 namespace dbr {
 
@@ -48,36 +45,29 @@ class DiscreteDbr {
   absl::Status Load(const TensorFile& file);
 
  private:
-  // A behaviour policy with the workspaces of its fit.
+  // Workspaces of a behaviour policy.
   struct Behavior {
-    TrainedNetwork<Scalar> network;
     Categorical<Scalar> distribution;  // at the states of the newest use
     MatrixX<Scalar> d_logits;          // [actions x n]
     Scalar loss = 0;                   // mean of -log beta(a|s) in the newest fit
   };
 
-  void SetLearningRate(double learning_rate);
-  static void FitBehavior(const BasicBatch<Scalar>& batch, Behavior* behavior);
+  static void FitBehavior(const BasicBatch<Scalar>& batch, TrainedNetwork<Scalar>* network,
+                          Behavior* behavior);
   static void EvaluateBehavior(const MatrixX<Scalar>& observations, const MatrixX<Scalar>& masks,
-                               Behavior* behavior);
+                               TrainedNetwork<Scalar>* network, Behavior* behavior);
   void ComputeTargets(const BasicBatch<Scalar>& batch);
   PolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
   void ComputeAdvantages(const BasicBatch<Scalar>& batch);
-  absl::Status Report(Scalar critic_loss, const PolicyLoss<Scalar>& policy_loss);
 
   AlgorithmSpec spec_;
   BatchNeeds needs_;
   PolicyLossOptions options_;
   Rng init_rng_;
   MlpShape shape_;
-  PairRunner runner_;
-  TrainedNetwork<Scalar> policy_;
-  TwinCritic<Scalar> critics_;
-  Behavior beta_plus_;
-  Behavior beta_minus_;
-  Multiplier<Scalar> multiplier_;
-  std::uint64_t updates_ = 0;
+  DualBehaviorNetworks<Scalar> networks_;
 
+  Behavior beta_plus_, beta_minus_;
   Categorical<Scalar> pi_, next_pi_;
   PolicyLossWorkspace<Scalar> workspace_;
   VectorX<Scalar> target_, penalty_;
