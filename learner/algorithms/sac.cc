@@ -36,16 +36,17 @@ absl::Status Sac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicB
   policy_.set_learning_rate(learning_rate);
   critics_.set_learning_rate(learning_rate);
   const Scalar critic_loss = FitCritics(uniform);
-  const Scalar actor_loss = ImprovePolicy(uniform);
+  const SoftPolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
   critics_.UpdateTargets(spec_.config.target_tau());
   ++updates_;
   advantages_.resize(static_cast<std::size_t>(uniform.size()));
   Eigen::Map<Eigen::VectorXf>(advantages_.data(), uniform.size()) =
       (behavior_value_ - value_).template cast<float>();
   const AdvantageFigures advantages = FiguresOf(advantages_);
-  return SetMetrics({critic_loss, actor_loss, temperature_.value(), entropy_, q_term_.value, target_.mean(),
-                     advantages.mean, advantages.positive, advantages.deviation},
-                    updates_, &metrics_);
+  return SetMetrics(
+      {critic_loss, policy_loss.loss, temperature_.value(), policy_loss.entropy, policy_loss.value,
+       target_.mean(), advantages.mean, advantages.positive, advantages.deviation},
+      updates_, &metrics_);
 }
 
 template <class Scalar>
@@ -53,11 +54,11 @@ Scalar Sac<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
   const Eigen::Index n = batch.size();
   head_.Split(policy_.Evaluate(batch.next_observations), kPolicyLogStd);
   FillNormal(rng_, spec_.actions.size, n, &noise_);
-  draws_.Draw(head_, noise_);
-  critics_.EvaluateTargets(draws_.CriticInput(batch.next_observations));
+  next_draws_.Draw(head_, noise_);
+  critics_.EvaluateTargets(next_draws_.CriticInput(batch.next_observations));
   target_.resize(n);
   MeanOfSmaller<Scalar>(critics_.target1(), critics_.target2(), &target_);
-  target_ -= temperature_.value() * draws_.sample().log_prob;
+  target_ -= temperature_.value() * next_draws_.sample().log_prob;
   target_ = static_cast<Scalar>(spec_.config.reward_scale()) * batch.rewards +
             batch.discounts.cwiseProduct(target_);
 
@@ -72,27 +73,17 @@ Scalar Sac<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
 }
 
 template <class Scalar>
-Scalar Sac<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
+SoftPolicyLoss<Scalar> Sac<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
   const Eigen::Index n = batch.size();
-  const Scalar temperature = temperature_.value();
   head_.Split(policy_.Forward(batch.observations), kPolicyLogStd);
   FillNormal(rng_, spec_.actions.size, n, &noise_);
-  draws_.Draw(head_, noise_);
-  critics_.Evaluate(draws_.CriticInput(batch.observations));
-  SmallerMeanQTerm<Scalar>({}, critics_.value1(), critics_.value2(), n, &q_term_);
+  const SoftPolicyLoss<Scalar> loss =
+      objective_.Compute(head_, batch.observations, noise_, temperature_.value(), &critics_, &d_output_);
+  policy_.Step(batch.observations, d_output_);
   value_.resize(n);
   MeanOfSmaller<Scalar>(critics_.value1(), critics_.value2(), &value_);
-
-  d_log_prob_.setConstant(n, temperature / static_cast<Scalar>(n));
-  gradient_.mean.setZero(spec_.actions.size, n);
-  gradient_.log_std.setZero(spec_.actions.size, n);
-  draws_.Backprop(critics_.InputGradient(q_term_.d_q1, q_term_.d_q2), d_log_prob_, &gradient_);
-  head_.Join(gradient_, &d_output_);
-  policy_.Step(batch.observations, d_output_);
-
-  entropy_ = -draws_.sample().log_prob.mean();
-  temperature_.Step(target_entropy_ - entropy_);
-  return q_term_.loss - temperature * entropy_;
+  temperature_.Step(target_entropy_ - loss.entropy);
+  return loss;
 }
 
 template <class Scalar>

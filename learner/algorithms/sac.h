@@ -11,6 +11,7 @@
 #include "learner/parts/multiplier.h"
 #include "learner/parts/pair_runner.h"
 #include "learner/parts/sampled_actions.h"
+#include "learner/parts/soft_policy_objective.h"
 #include "learner/parts/trained_network.h"
 #include "learner/parts/twin_critic.h"
 #include "nn/gaussian_head.h"
@@ -45,7 +46,7 @@ class Sac {
 
  private:
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
-  Scalar ImprovePolicy(const BasicBatch<Scalar>& batch);
+  SoftPolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
 
   AlgorithmSpec spec_;
   Rng rng_;
@@ -58,12 +59,10 @@ class Sac {
   std::uint64_t updates_ = 0;
 
   GaussianHead<Scalar> head_;
-  SampledActions<Scalar> draws_;
+  SampledActions<Scalar> next_draws_;
+  SoftPolicyObjective<Scalar> objective_;
   MatrixX<Scalar> noise_, inputs_, d_output_;
-  VectorX<Scalar> target_, behavior_value_, value_, d_log_prob_;
-  QTerm<Scalar> q_term_;
-  GaussianGradient<Scalar> gradient_;
-  Scalar entropy_ = 0;
+  VectorX<Scalar> target_, behavior_value_, value_;
   std::vector<float> advantages_;
   std::vector<UpdateMetric> metrics_;
 };

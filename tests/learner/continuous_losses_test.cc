@@ -6,6 +6,7 @@
 
 #include "core/rng.h"
 #include "learner/parts/dual_behavior_objective.h"
+#include "learner/parts/soft_policy_objective.h"
 #include "tests/numeric.h"
 
 namespace dbr {
@@ -78,6 +79,25 @@ TEST(SmallerMeanQTermTest, HasItsGradientsAndLeavesTheScaleConstant) {
       EXPECT_DOUBLE_EQ(scale, 1);
     }
   }
+}
+
+TEST(SoftPolicyObjectiveTest, GradientMatchesDifferences) {
+  Rng rng(8);
+  PairRunner runner(1);
+  TwinCritic<double> critics(MlpShape(kObservation + kDimensions, {6, 6}, 1), 1e-3, rng, &runner);
+  const Matrix observations = Normal(kObservation, kStates, rng), noise = Normal(kDimensions, kStates, rng);
+  const Matrix output = 0.5 * Normal(2 * kDimensions, kStates, rng);
+  SoftPolicyObjective<double> objective;
+  const auto loss = [&](const Matrix& at, Matrix* gradient) {
+    GaussianHead<double> pi;
+    pi.Split(at, kPolicyLogStd);
+    return objective.Compute(pi, observations, noise, 0.3, &critics, gradient);
+  };
+  Matrix gradient, unused;
+  const SoftPolicyLoss<double> at_output = loss(output, &gradient);
+  EXPECT_NEAR(at_output.loss, -at_output.value - 0.3 * at_output.entropy, 1e-12);
+  ExpectIsGradient(
+      gradient, [&](const Matrix& at) { return loss(at, &unused).loss; }, output);
 }
 
 struct Case {
