@@ -90,11 +90,8 @@ void LearnerUpdate(benchmark::State& state, const AlgorithmSpec& spec) {
       (*algorithm)->UpdateFlops() * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
   state.SetItemsProcessed(state.iterations());
 }
-#define DBR_UPDATE(name, spec)             \
-  BENCHMARK_CAPTURE(LearnerUpdate, , spec) \
-      ->Name("LearnerUpdate/" name)        \
-      ->Unit(benchmark::kMillisecond)      \
-      ->UseRealTime()
+#define DBR_UPDATE(name, spec) \
+  BENCHMARK_CAPTURE(LearnerUpdate, , spec)->Name("LearnerUpdate/" name)->Unit(benchmark::kMillisecond)
 
 DBR_UPDATE("dbr/connect4", Dbr(Connect4()));
 DBR_UPDATE("sac/hopper", Sac(Hopper()));
