@@ -19,9 +19,8 @@
 namespace dbr {
 
 // State: policy pi, twin critics with targets, a temperature. One update on a batch B drawn uniformly from D:
-//   1. y = r + discount * (min_i Q'_i(s', a') - temperature * log pi(a'|s')), a' drawn from pi (equations 5,
-//   3);
-//      each critic regresses on y.
+//   1. y = r + discount * (min_i Q'_i(s', a') - temperature * log pi(a'|s')), a' drawn from pi
+//      (equations 3 and 5); each critic regresses on y.
 //   2. pi minimises E[temperature * log pi(a|s) - min_i Q_i(s, a)], a drawn through pi (equation 9).
 //   3. The temperature rises where the entropy is below its target, and falls above it (equation 18).
 //   4. Polyak averaging of the critics.
