@@ -87,8 +87,10 @@ std::string AlgorithmName(const AlgorithmConfig& config);
 
 // All algorithms, once for each kind of action that they serve; the conformance suite walks them.
 struct AlgorithmId {
-  std::string name;
+  std::string name;  // as the member of AlgorithmConfig's oneof that sets it
   ActionKind actions;
+  std::string source;    // the publication
+  std::string variants;  // the fields of its config message that choose between variants; may be empty
 };
 std::vector<AlgorithmId> Algorithms();
 

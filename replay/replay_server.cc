@@ -23,7 +23,7 @@ ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& la
       replay.tolerance() > 0 ? replay.tolerance()
                              : 0.1 * static_cast<double>(replay.capacity()) * replay.samples_per_insert();
   options.buffer.limiter.min_size = replay.min_size();
-  options.buffer.cumulative_advantage = replay.cumulative_advantage();
+  options.buffer.cumulative_advantage = config.algorithm().dbr().advantage() == DbrConfig::ARM_CUMULATIVE;
   options.buffer.seed = config.seed();
   options.buffer.seed_share = replay.seed().share();
   options.seed = SeedOptionsFrom(config);

@@ -19,62 +19,34 @@ template <class Scalar>
 absl::Status ContinuousDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                                            const BasicBatch<Scalar>& minus) {
   networks_.Begin(spec_.config);
-  networks_.runner.Run([&] { FitBehavior(plus, &networks_.beta_plus, &beta_plus_); },
-                       [&] { FitBehavior(minus, &networks_.beta_minus, &beta_minus_); });
-  ComputeTargets(uniform);
-  const Scalar critic_loss = FitCritics(uniform);
+  networks_.runner.Run([&] { beta_plus_.Fit(plus, nullptr, &networks_.beta_plus); },
+                       [&] { beta_minus_.Fit(minus, nullptr, &networks_.beta_minus); });
+  ComputeNextValue(uniform);
+  const Scalar critic_loss =
+      regression_.Fit(uniform, spec_.config.reward_scale(), next_value_, &networks_.critics);
   const PolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
   networks_.Finish(spec_.config, policy_loss);
-  return networks_.Report({critic_loss, beta_plus_.loss, beta_minus_.loss}, policy_loss, target_.mean(),
-                          advantages_, &metrics_);
+  return networks_.Report({critic_loss, beta_plus_.loss(), beta_minus_.loss()}, policy_loss,
+                          regression_.target().mean(), advantages_, &metrics_);
 }
 
 template <class Scalar>
-void ContinuousDbr<Scalar>::FitBehavior(const BasicBatch<Scalar>& batch, TrainedNetwork<Scalar>* network,
-                                        Behavior* behavior) {
-  if (batch.size() == 0) return;
-  behavior->head.Split(network->Forward(batch.observations), kBehaviorLogStd);
-  TanhLogProb<Scalar>(behavior->head.view(), batch.actions, &behavior->log_prob, &behavior->gradient);
-  behavior->loss = -behavior->log_prob.mean();
-  const Scalar weight = -1 / static_cast<Scalar>(batch.size());
-  behavior->gradient.mean *= weight;
-  behavior->gradient.log_std *= weight;
-  behavior->head.Join(behavior->gradient, &behavior->d_output);
-  network->Step(batch.observations, behavior->d_output);
-}
-
-template <class Scalar>
-void ContinuousDbr<Scalar>::ComputeTargets(const BasicBatch<Scalar>& batch) {
+void ContinuousDbr<Scalar>::ComputeNextValue(const BasicBatch<Scalar>& batch) {
   const DbrConfig& config = spec_.config.dbr();
   const Eigen::Index n = batch.size();
   next_pi_.Split(networks_.policy.ForwardTarget(batch.next_observations), kPolicyLogStd);
   FillNormal(rng_, spec_.actions.size, config.target_samples() * n, &next_noise_);
   next_draws_.DrawActions(next_pi_, next_noise_);
   networks_.critics.EvaluateTargets(next_draws_.CriticInput(batch.next_observations));
-  target_.resize(n);
+  next_value_.resize(n);
   GreatestTargetValue<Scalar>(networks_.critics.target1(), networks_.critics.target2(),
-                              static_cast<Scalar>(config.target_min_weight()), &target_);
+                              static_cast<Scalar>(config.target_min_weight()), &next_value_);
   if (config.value_penalty()) {
     DrawDivergenceNoise(n);
-    beta_plus_.head.Split(networks_.beta_plus.Evaluate(batch.next_observations), kBehaviorLogStd);
-    penalty_.Compute({options_.divergence, options_.mmd_sigma}, next_pi_, beta_plus_.head,
-                     {noise_.pi, noise_.plus});
-    target_ -= networks_.multiplier.value() * penalty_.value();
+    penalty_.Compute({options_.divergence, options_.mmd_sigma}, next_pi_,
+                     beta_plus_.At(batch.next_observations, &networks_.beta_plus), {noise_.pi, noise_.plus});
+    next_value_ -= networks_.multiplier.value() * penalty_.value();
   }
-  target_ = static_cast<Scalar>(spec_.config.reward_scale()) * batch.rewards +
-            batch.discounts.cwiseProduct(target_);
-}
-
-template <class Scalar>
-Scalar ContinuousDbr<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
-  inputs_.resize(critic_shape_.input_size(), batch.size());
-  inputs_ << batch.observations, batch.actions;
-  const Scalar loss = networks_.critics.Fit(inputs_, [&](const MatrixX<Scalar>& q, MatrixX<Scalar>* d_q) {
-    return SquaredError<Scalar>(q, target_, d_q);
-  });
-  behavior_value_.resize(batch.size());
-  MeanOfSmaller<Scalar>(networks_.critics.q1(), networks_.critics.q2(), &behavior_value_);
-  return loss;
 }
 
 template <class Scalar>
@@ -90,23 +62,21 @@ template <class Scalar>
 PolicyLoss<Scalar> ContinuousDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
   const DbrConfig& config = spec_.config.dbr();
   const Eigen::Index n = batch.size();
-  const auto evaluate = [&](TrainedNetwork<Scalar>* network, Behavior* behavior) {
-    behavior->head.Split(network->Evaluate(batch.observations), kBehaviorLogStd);
-  };
-  networks_.runner.Run([&] { evaluate(&networks_.beta_plus, &beta_plus_); },
-                       [&] { evaluate(&networks_.beta_minus, &beta_minus_); });
+  networks_.runner.Run([&] { beta_plus_.At(batch.observations, &networks_.beta_plus); },
+                       [&] { beta_minus_.At(batch.observations, &networks_.beta_minus); });
   pi_.Split(networks_.policy.Forward(batch.observations), kPolicyLogStd);
   FillNormal(rng_, spec_.actions.size, config.policy_samples() * n, &noise_.actions);
   DrawDivergenceNoise(n);
   options_.use_q = networks_.updates >= config.warm_start_updates();
   const PolicyLoss<Scalar> loss =
-      objective_.Compute(options_, {pi_, beta_plus_.head, beta_minus_.head}, batch.observations, noise_,
+      objective_.Compute(options_, {pi_, beta_plus_.head(), beta_minus_.head()}, batch.observations, noise_,
                          networks_.multiplier.value(), &networks_.critics, &d_output_);
   networks_.policy.Step(batch.observations, d_output_);
   value_.resize(n);
   objective_.StateValue(networks_.critics, &value_);
   advantages_.resize(static_cast<std::size_t>(n));
-  Eigen::Map<Eigen::VectorXf>(advantages_.data(), n) = (behavior_value_ - value_).template cast<float>();
+  Eigen::Map<Eigen::VectorXf>(advantages_.data(), n) =
+      (regression_.behavior_value() - value_).template cast<float>();
   return loss;
 }
 

@@ -6,8 +6,10 @@
 
 #include "core/rng.h"
 #include "learner/algorithm.h"
+#include "learner/parts/critic_regression.h"
 #include "learner/parts/dual_behavior_networks.h"
 #include "learner/parts/dual_behavior_objective.h"
+#include "learner/parts/gaussian_likelihood.h"
 
 namespace dbr {
 
@@ -41,19 +43,8 @@ class ContinuousDbr {
   absl::Status Load(const TensorFile& file);
 
  private:
-  // Workspaces of a behaviour policy.
-  struct Behavior {
-    GaussianHead<Scalar> head;  // at the states of the newest use
-    VectorX<Scalar> log_prob;
-    GaussianGradient<Scalar> gradient;
-    MatrixX<Scalar> d_output;
-    Scalar loss = 0;  // mean of -log beta(a|s) in the newest fit
-  };
-
-  static void FitBehavior(const BasicBatch<Scalar>& batch, TrainedNetwork<Scalar>* network,
-                          Behavior* behavior);
-  void ComputeTargets(const BasicBatch<Scalar>& batch);
-  Scalar FitCritics(const BasicBatch<Scalar>& batch);
+  // V'(s') [n] into next_value_.
+  void ComputeNextValue(const BasicBatch<Scalar>& batch);
   PolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
   void DrawDivergenceNoise(Eigen::Index n);
 
@@ -64,14 +55,15 @@ class ContinuousDbr {
   MlpShape policy_shape_, critic_shape_;
   DualBehaviorNetworks<Scalar> networks_;
 
-  Behavior beta_plus_, beta_minus_;
+  GaussianLikelihood<Scalar> beta_plus_{kBehaviorLogStd}, beta_minus_{kBehaviorLogStd};
+  CriticRegression<Scalar> regression_;
   GaussianHead<Scalar> pi_, next_pi_;
   SampledActions<Scalar> next_draws_;
   DualBehaviorObjective<Scalar> objective_;
   GaussianDivergence<Scalar> penalty_;
   ObjectiveNoise<Scalar> noise_;
-  MatrixX<Scalar> next_noise_, inputs_, d_output_;
-  VectorX<Scalar> target_, behavior_value_, value_;
+  MatrixX<Scalar> next_noise_, d_output_;
+  VectorX<Scalar> next_value_, value_;
   std::vector<float> advantages_;
   std::vector<UpdateMetric> metrics_;
 };

@@ -15,24 +15,19 @@ struct Entry {
   AlgorithmConfig::AlgorithmCase config_case;
   ActionKind actions;
   std::unique_ptr<Algorithm> (*make)(const AlgorithmSpec&);
+  const char* source;    // the publication
+  const char* variants;  // the fields of its config message that choose between variants
 };
+
+constexpr char kDbrSource[] = "Siu, Traish, Xu 2021";
+constexpr char kDbrVariants[] =
+    "constraint, divergence, advantage, repel_negative, value_penalty, munchausen_weight";
 
 constexpr Entry kAlgorithms[] = {
-    {"dbr", AlgorithmConfig::kDbr, ActionKind::kDiscrete, MakeDiscreteDbr},
-    {"dbr", AlgorithmConfig::kDbr, ActionKind::kContinuous, MakeContinuousDbr},
-    {"sac", AlgorithmConfig::kSac, ActionKind::kContinuous, MakeSac},
+    {"dbr", AlgorithmConfig::kDbr, ActionKind::kDiscrete, MakeDiscreteDbr, kDbrSource, kDbrVariants},
+    {"dbr", AlgorithmConfig::kDbr, ActionKind::kContinuous, MakeContinuousDbr, kDbrSource, kDbrVariants},
+    {"sac", AlgorithmConfig::kSac, ActionKind::kContinuous, MakeSac, "Haarnoja et al. 2018", ""},
 };
-
-// Options that serve one kind of action alone.
-absl::Status CheckOptions(const AlgorithmSpec& spec) {
-  const DbrConfig& dbr = spec.config.dbr();
-  if (spec.actions.discrete() && IsSampled(dbr.divergence())) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("algorithm.dbr.divergence: expected KL or MMD_EXACT for the discrete actions of '",
-                     spec.env, "', found ", DbrConfig::Divergence_Name(dbr.divergence())));
-  }
-  return absl::OkStatus();
-}
 
 const char* NameOf(ActionKind kind) {
   return kind == ActionKind::kDiscrete ? "discrete" : "continuous";
@@ -42,7 +37,8 @@ const char* NameOf(ActionKind kind) {
 
 std::vector<AlgorithmId> Algorithms() {
   std::vector<AlgorithmId> algorithms;
-  for (const Entry& entry : kAlgorithms) algorithms.push_back({entry.name, entry.actions});
+  for (const Entry& entry : kAlgorithms)
+    algorithms.push_back({entry.name, entry.actions, entry.source, entry.variants});
   return algorithms;
 }
 
@@ -59,7 +55,6 @@ absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& sp
     if (entry.actions != spec.actions.kind) continue;
     serving.push_back(entry.name);
     if (entry.config_case != spec.config.algorithm_case()) continue;
-    if (absl::Status status = CheckOptions(spec); !status.ok()) return status;
     std::unique_ptr<Algorithm> algorithm = entry.make(spec);
     return spec.normalize_observations ? Normalized(spec, std::move(algorithm)) : std::move(algorithm);
   }

@@ -41,11 +41,11 @@ absl::Status Sac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicB
   ++updates_;
   advantages_.resize(static_cast<std::size_t>(uniform.size()));
   Eigen::Map<Eigen::VectorXf>(advantages_.data(), uniform.size()) =
-      (behavior_value_ - value_).template cast<float>();
+      (regression_.behavior_value() - value_).template cast<float>();
   const AdvantageFigures advantages = FiguresOf(advantages_);
   return SetMetrics(
       {critic_loss, policy_loss.loss, temperature_.value(), policy_loss.entropy, policy_loss.value,
-       target_.mean(), advantages.mean, advantages.positive, advantages.deviation},
+       regression_.target().mean(), advantages.mean, advantages.positive, advantages.deviation},
       updates_, &metrics_);
 }
 
@@ -56,20 +56,10 @@ Scalar Sac<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
   FillNormal(rng_, spec_.actions.size, n, &noise_);
   next_draws_.Draw(head_, noise_);
   critics_.EvaluateTargets(next_draws_.CriticInput(batch.next_observations));
-  target_.resize(n);
-  MeanOfSmaller<Scalar>(critics_.target1(), critics_.target2(), &target_);
-  target_ -= temperature_.value() * next_draws_.sample().log_prob;
-  target_ = static_cast<Scalar>(spec_.config.reward_scale()) * batch.rewards +
-            batch.discounts.cwiseProduct(target_);
-
-  inputs_.resize(critic_shape_.input_size(), n);
-  inputs_ << batch.observations, batch.actions;
-  const Scalar loss = critics_.Fit(inputs_, [&](const MatrixX<Scalar>& q, MatrixX<Scalar>* d_q) {
-    return SquaredError<Scalar>(q, target_, d_q);
-  });
-  behavior_value_.resize(n);
-  MeanOfSmaller<Scalar>(critics_.q1(), critics_.q2(), &behavior_value_);
-  return loss;
+  next_value_.resize(n);
+  MeanOfSmaller<Scalar>(critics_.target1(), critics_.target2(), &next_value_);
+  next_value_ -= temperature_.value() * next_draws_.sample().log_prob;
+  return regression_.Fit(batch, spec_.config.reward_scale(), next_value_, &critics_);
 }
 
 template <class Scalar>

@@ -8,6 +8,7 @@
 #include "core/rng.h"
 #include "learner/algorithm.h"
 #include "learner/parts/continuous_losses.h"
+#include "learner/parts/critic_regression.h"
 #include "learner/parts/multiplier.h"
 #include "learner/parts/pair_runner.h"
 #include "learner/parts/sampled_actions.h"
@@ -60,8 +61,9 @@ class Sac {
   GaussianHead<Scalar> head_;
   SampledActions<Scalar> next_draws_;
   SoftPolicyObjective<Scalar> objective_;
-  MatrixX<Scalar> noise_, inputs_, d_output_;
-  VectorX<Scalar> target_, behavior_value_, value_;
+  CriticRegression<Scalar> regression_;
+  MatrixX<Scalar> noise_, d_output_;
+  VectorX<Scalar> next_value_, value_;
   std::vector<float> advantages_;
   std::vector<UpdateMetric> metrics_;
 };

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstdlib>
 
@@ -141,11 +142,21 @@ TEST(Registry, RefusesAnActionSpaceThatTheAlgorithmDoesNotServe) {
               testing::HasSubstr("serves the discrete actions of environment 'test' (dbr), found sac"));
 }
 
-TEST(Registry, RefusesASampledDivergenceOverDiscreteActions) {
-  AlgorithmSpec spec = SmallSpec();
-  spec.config.mutable_dbr()->set_divergence(DbrConfig::MMD_LAPLACIAN);
-  EXPECT_THAT(std::string(MakeAlgorithm(spec).status().message()),
-              testing::HasSubstr("expected KL or MMD_EXACT"));
+TEST(Registry, OverDiscreteActionsAllThreeMmdsAreOne) {
+  TensorFile states[3];
+  for (int i = 0; i < 3; ++i) {
+    AlgorithmSpec spec = SmallSpec();
+    spec.config.mutable_dbr()->set_divergence(
+        std::array{DbrConfig::MMD_EXACT, DbrConfig::MMD_LAPLACIAN, DbrConfig::MMD_GAUSSIAN}[i]);
+    const auto algorithm = MakeAlgorithm(spec);
+    ASSERT_TRUE(algorithm.ok()) << algorithm.status();
+    Rng rng(4);
+    const Batch uniform = RandomBatch<float>(spec, 16, rng), plus = RandomBatch<float>(spec, 16, rng);
+    ASSERT_TRUE((*algorithm)->Update({uniform, plus, plus}).ok());
+    (*algorithm)->Save(&states[i]);
+  }
+  EXPECT_EQ(states[0].tensors, states[1].tensors);
+  EXPECT_EQ(states[0].tensors, states[2].tensors);
 }
 
 // Observations far from 0 and of another scale give, but for rounding, what the same at home gives.

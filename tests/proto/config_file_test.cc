@@ -147,7 +147,7 @@ TEST(OverrideTest, SetsFieldsByTheirPath) {
   const Config config =
       Parsed("algorithm { dbr { constraint: FIXED epsilon: 0.2 } } env { opponents: \"random\" }",
              {"algorithm.dbr.epsilon=0.1", "env.opponents=[one_ply, \"mcts:10\"]", "network.hidden_sizes=64",
-              "actor.mode=SUPPORT", "learner.address=unix:/run/a=b.sock", "replay.cumulative_advantage=true",
+              "actor.mode=SUPPORT", "learner.address=unix:/run/a=b.sock", "replay.seed.evict=true",
               "seed = 9"});
   EXPECT_EQ(config.algorithm().dbr().constraint(), DbrConfig::FIXED);
   EXPECT_EQ(config.algorithm().dbr().epsilon(), 0.1);
@@ -155,7 +155,7 @@ TEST(OverrideTest, SetsFieldsByTheirPath) {
   EXPECT_THAT(HiddenSizes(config), ElementsAre(64));
   EXPECT_EQ(config.actor().mode(), SUPPORT);
   EXPECT_EQ(config.learner().address(), "unix:/run/a=b.sock");
-  EXPECT_TRUE(config.replay().cumulative_advantage());
+  EXPECT_TRUE(config.replay().seed().evict());
   EXPECT_EQ(config.seed(), 9u);
 }
 

@@ -1,0 +1,38 @@
+// The step of the twin critics over continuous actions, which all algorithms there have in common.
+#pragma once
+
+#include "core/batch.h"
+#include "learner/parts/continuous_losses.h"
+#include "learner/parts/twin_critic.h"
+
+namespace dbr {
+
+// Workspaces, reused from batch to batch.
+template <class Scalar>
+class CriticRegression {
+ public:
+  // One step of both critics on the mean of (Q_i(s, a) - y)^2, y = reward_scale * r + discount * V'(s') a
+  // constant. next_value [n] is V'(s'). Gives the two losses' mean.
+  Scalar Fit(const BasicBatch<Scalar>& batch, double reward_scale, const VectorX<Scalar>& next_value,
+             TwinCritic<Scalar>* critics) {
+    target_ = static_cast<Scalar>(reward_scale) * batch.rewards + batch.discounts.cwiseProduct(next_value);
+    inputs_.resize(batch.observations.rows() + batch.actions.rows(), batch.size());
+    inputs_ << batch.observations, batch.actions;
+    const Scalar loss = critics->Fit(inputs_, [&](const MatrixX<Scalar>& q, MatrixX<Scalar>* d_q) {
+      return SquaredError<Scalar>(q, target_, d_q);
+    });
+    behavior_value_.resize(batch.size());
+    MeanOfSmaller<Scalar>(critics->q1(), critics->q2(), &behavior_value_);
+    return loss;
+  }
+
+  const VectorX<Scalar>& target() const { return target_; }  // [n] y
+  // [n] the smaller twin at the batch's actions, from before the step.
+  const VectorX<Scalar>& behavior_value() const { return behavior_value_; }
+
+ private:
+  VectorX<Scalar> target_, behavior_value_;
+  MatrixX<Scalar> inputs_;  // [observation + dimensions x n]
+};
+
+}  // namespace dbr
