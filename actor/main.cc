@@ -10,7 +10,7 @@
 #include "actor/actor.h"
 #include "core/run_folder.h"
 #include "core/shutdown.h"
-#include "nn/blas_threads.h"
+#include "nn/blas_setup.h"
 #include "proto/config_file.h"
 #include "proto/service_main.h"
 
@@ -82,7 +82,7 @@ int Main(int argc, char** argv) {
 }  // namespace dbr
 
 int main(int argc, char** argv) {
-  dbr::RestartWithOneBlasThread(argv);
+  dbr::RestartWithBlasSetUp(argv);
   dbr::BlockShutdownSignals();
   return dbr::Main(argc, argv);
 }

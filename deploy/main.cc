@@ -3,7 +3,7 @@
 
 #include "core/shutdown.h"
 #include "deploy/command_line.h"
-#include "nn/blas_threads.h"
+#include "nn/blas_setup.h"
 
 namespace {
 
@@ -29,7 +29,7 @@ int Main(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  dbr::RestartWithOneBlasThread(argv);  // and so do the programs that we start
+  dbr::RestartWithBlasSetUp(argv);  // and so do the programs that we start
   dbr::BlockShutdownSignals();
   return Main(argc, argv);
 }

@@ -16,7 +16,7 @@
 #include "learner/policy_service.h"
 #include "learner/rollout_reporter.h"
 #include "learner/trainer.h"
-#include "nn/blas_threads.h"
+#include "nn/blas_setup.h"
 #include "proto/config_file.h"
 #include "proto/server.h"
 #include "proto/service_main.h"
@@ -156,7 +156,7 @@ int Main(int argc, char** argv) {
 }  // namespace dbr
 
 int main(int argc, char** argv) {
-  dbr::RestartWithOneBlasThread(argv);
+  dbr::RestartWithBlasSetUp(argv);
   dbr::BlockShutdownSignals();
   return dbr::Main(argc, argv);
 }

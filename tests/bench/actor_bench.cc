@@ -9,7 +9,6 @@
 #include "actor/step_loop.h"
 #include "benchmark/benchmark.h"
 #include "core/check.h"
-#include "nn/blas_threads.h"
 #include "nn/mlp.h"
 #include "nn/policy.h"
 #include "proto/codec.h"
@@ -46,7 +45,6 @@ double FlopsOfAMove(const EnvSpec& env) {
 // first advantage, the games, and the transitions encoded as an insert message holds them. `flops` counts the
 // products alone.
 void ActorMoves(benchmark::State& state, const std::string& env_name) {
-  UseOneBlasThread();
   auto envs = VectorEnv::Create({.name = env_name, .opponents = {}}, kGames).value();
   const EnvSpec spec = envs->spec();
   const TransitionLayout layout = TransitionLayout::Of(spec);
@@ -74,7 +72,6 @@ BENCHMARK_CAPTURE(ActorMoves, connect4, "connect4")->Unit(benchmark::kMicrosecon
 
 // Items are episodes of the evaluator on one thread.
 void EvaluatedEpisodes(benchmark::State& state, const std::string& env_name, const std::string& opponent) {
-  UseOneBlasThread();
   const auto envs = VectorEnv::Create({.name = env_name, .opponents = {}}, 1).value();
   const auto policy = UntrainedPolicy(envs->spec());
   const EvaluationOptions options = {

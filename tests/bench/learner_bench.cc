@@ -4,7 +4,6 @@
 
 #include "core/rng.h"
 #include "learner/algorithm.h"
-#include "nn/blas_threads.h"
 
 namespace dbr {
 namespace {
@@ -72,7 +71,6 @@ AlgorithmSpec OnTwoThreads(AlgorithmSpec spec) {
 }
 
 void LearnerUpdate(benchmark::State& state, const AlgorithmSpec& spec) {
-  UseOneBlasThread();
   const auto algorithm = MakeAlgorithm(spec);
   if (!algorithm.ok()) return state.SkipWithError(std::string(algorithm.status().message()).c_str());
   const BatchNeeds needs = (*algorithm)->needs();
@@ -107,7 +105,6 @@ DBR_UPDATE("dbr/ant/two_threads", OnTwoThreads(Dbr(Ant())))->UseRealTime();
 
 // The limit: a product of two square matrices in single precision.
 void Sgemm(benchmark::State& state) {
-  UseOneBlasThread();
   constexpr Eigen::Index kSize = 256;
   const MatrixX<float> a = MatrixX<float>::Random(kSize, kSize), b = MatrixX<float>::Random(kSize, kSize);
   MatrixX<float> c(kSize, kSize);

@@ -1,0 +1,26 @@
+// How OpenBLAS works in our programs: with no threads but the caller's, always, for we place threads
+// ourselves; and with a kernel that suits the processor.
+#pragma once
+
+namespace dbr {
+
+// Keeps OpenBLAS from using threads of its own for matrix products.
+void UseOneBlasThread();
+
+// Sets OpenBLAS up for a whole program and the programs that it starts, in the first line of its main, before
+// signals are blocked: executes the program again in the same process, with OPENBLAS_NUM_THREADS=1 and, where
+// SlowKernel() says so, OPENBLAS_CORETYPE. Both are read when OpenBLAS is loaded, and its threads start
+// there, where no mask of ours reaches: such a thread would take a SIGTERM and the program would die without
+// draining. Does nothing where OPENBLAS_NUM_THREADS is 1 already.
+void RestartWithBlasSetUp(char** argv);
+
+// A matrix product of kTrialSize^3 by a plain loop: c = a b, all column-major [kTrialSize x kTrialSize].
+inline constexpr int kTrialSize = 64;
+void PlainProduct(const float* a, const float* b, float* c);
+
+// True where OpenBLAS's own choice of kernel, by the processor's model, is slower than 1 / 1.3 of a plain
+// loop: it then does not suit the processor. (OpenBLAS 0.3.21 on AMD's first Zen: 10 GFLOP/s, a plain loop
+// 20, and OpenBLAS's kernel for an older AMD processor 33.) Takes 2 ms, or 20 where the kernel is slow.
+bool SlowKernel();
+
+}  // namespace dbr
