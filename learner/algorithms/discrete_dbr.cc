@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "learner/algorithms/algorithm_adapter.h"
+#include "learner/parts/critic_target.h"
 
 namespace dbr {
 template <class Scalar>
@@ -27,7 +28,9 @@ absl::Status DiscreteDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, cons
         return CriticLoss<Scalar>(q, uniform.actions, target_, d_q);
       });
   const PolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
-  ComputeAdvantages(uniform);
+  ExpectedTargetValue<Scalar>(pi_, networks_.critics.q1(), networks_.critics.q2(), /*min_weight=*/1, &value_);
+  ComputeAdvantages<Scalar>(networks_.critics.q1(), networks_.critics.q2(), uniform.actions, value_,
+                            &advantages_);
   networks_.Finish(spec_.config, policy_loss);
   return networks_.Report({critic_loss, beta_plus_.loss, beta_minus_.loss}, policy_loss, target_.mean(),
                           advantages_, &metrics_);
@@ -61,8 +64,7 @@ void DiscreteDbr<Scalar>::ComputeTargets(const BasicBatch<Scalar>& batch) {
                        beta_plus_.distribution, &penalty_, nullptr);
     target_ -= networks_.multiplier.value() * penalty_;
   }
-  const auto scale = static_cast<Scalar>(spec_.config.reward_scale());
-  target_ = scale * batch.rewards + batch.discounts.cwiseProduct(target_);
+  CriticTarget(batch, spec_.config.reward_scale(), target_, &target_);
 }
 
 template <class Scalar>
@@ -77,20 +79,6 @@ PolicyLoss<Scalar> DiscreteDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& 
       beta_minus_.distribution, networks_.multiplier.value(), &workspace_, &d_logits_);
   networks_.policy.Step(batch.observations, d_logits_);
   return loss;
-}
-
-template <class Scalar>
-void DiscreteDbr<Scalar>::ComputeAdvantages(const BasicBatch<Scalar>& batch) {
-  advantages_.resize(static_cast<std::size_t>(batch.size()));
-  for (Eigen::Index j = 0; j < batch.size(); ++j) {
-    const auto a = static_cast<Eigen::Index>(batch.actions(0, j));
-    Scalar value = 0;
-    for (Eigen::Index k = 0; k < pi_.probabilities.rows(); ++k) {
-      value += pi_.probabilities(k, j) * std::min(networks_.critics.q1()(k, j), networks_.critics.q2()(k, j));
-    }
-    advantages_[static_cast<std::size_t>(j)] =
-        static_cast<float>(std::min(networks_.critics.q1()(a, j), networks_.critics.q2()(a, j)) - value);
-  }
 }
 
 template <class Scalar>

@@ -58,7 +58,6 @@ class DiscreteDbr {
                                TrainedNetwork<Scalar>* network, Behavior* behavior);
   void ComputeTargets(const BasicBatch<Scalar>& batch);
   PolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
-  void ComputeAdvantages(const BasicBatch<Scalar>& batch);
 
   AlgorithmSpec spec_;
   BatchNeeds needs_;
@@ -70,7 +69,7 @@ class DiscreteDbr {
   Behavior beta_plus_, beta_minus_;
   Categorical<Scalar> pi_, next_pi_;
   PolicyLossWorkspace<Scalar> workspace_;
-  VectorX<Scalar> target_, penalty_;
+  VectorX<Scalar> target_, penalty_, value_;
   MatrixX<Scalar> d_logits_;
   std::vector<float> advantages_;
   std::vector<UpdateMetric> metrics_;

@@ -3,9 +3,11 @@
 #include "absl/strings/str_join.h"
 #include "learner/algorithm.h"
 #include "learner/algorithms/continuous_dbr.h"
+#include "learner/algorithms/ddqn.h"
 #include "learner/algorithms/discrete_dbr.h"
 #include "learner/algorithms/normalized.h"
 #include "learner/algorithms/sac.h"
+#include "learner/algorithms/sac_discrete.h"
 
 namespace dbr {
 namespace {
@@ -27,6 +29,9 @@ constexpr Entry kAlgorithms[] = {
     {"dbr", AlgorithmConfig::kDbr, ActionKind::kDiscrete, MakeDiscreteDbr, kDbrSource, kDbrVariants},
     {"dbr", AlgorithmConfig::kDbr, ActionKind::kContinuous, MakeContinuousDbr, kDbrSource, kDbrVariants},
     {"sac", AlgorithmConfig::kSac, ActionKind::kContinuous, MakeSac, "Haarnoja et al. 2018", ""},
+    {"ddqn", AlgorithmConfig::kDdqn, ActionKind::kDiscrete, MakeDdqn, "van Hasselt et al. 2016", ""},
+    {"sac_discrete", AlgorithmConfig::kSacDiscrete, ActionKind::kDiscrete, MakeSacDiscrete,
+     "Christodoulou 2019", ""},
 };
 
 const char* NameOf(ActionKind kind) {

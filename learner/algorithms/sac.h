@@ -9,12 +9,9 @@
 #include "learner/algorithm.h"
 #include "learner/parts/continuous_losses.h"
 #include "learner/parts/critic_regression.h"
-#include "learner/parts/multiplier.h"
-#include "learner/parts/pair_runner.h"
 #include "learner/parts/sampled_actions.h"
+#include "learner/parts/soft_networks.h"
 #include "learner/parts/soft_policy_objective.h"
-#include "learner/parts/trained_network.h"
-#include "learner/parts/twin_critic.h"
 #include "nn/gaussian_head.h"
 
 namespace dbr {
@@ -51,12 +48,8 @@ class Sac {
   AlgorithmSpec spec_;
   Rng rng_;
   MlpShape policy_shape_, critic_shape_;
-  PairRunner runner_;
-  TrainedNetwork<Scalar> policy_;
-  TwinCritic<Scalar> critics_;
-  Multiplier<Scalar> temperature_;
+  SoftNetworks<Scalar> networks_;
   Scalar target_entropy_;  // nats
-  std::uint64_t updates_ = 0;
 
   GaussianHead<Scalar> head_;
   SampledActions<Scalar> next_draws_;

@@ -3,6 +3,7 @@
 
 #include "core/batch.h"
 #include "learner/parts/continuous_losses.h"
+#include "learner/parts/critic_target.h"
 #include "learner/parts/twin_critic.h"
 
 namespace dbr {
@@ -15,7 +16,7 @@ class CriticRegression {
   // constant. next_value [n] is V'(s'). Gives the two losses' mean.
   Scalar Fit(const BasicBatch<Scalar>& batch, double reward_scale, const VectorX<Scalar>& next_value,
              TwinCritic<Scalar>* critics) {
-    target_ = static_cast<Scalar>(reward_scale) * batch.rewards + batch.discounts.cwiseProduct(next_value);
+    CriticTarget(batch, reward_scale, next_value, &target_);
     inputs_.resize(batch.observations.rows() + batch.actions.rows(), batch.size());
     inputs_ << batch.observations, batch.actions;
     const Scalar loss = critics->Fit(inputs_, [&](const MatrixX<Scalar>& q, MatrixX<Scalar>* d_q) {

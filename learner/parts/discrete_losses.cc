@@ -36,6 +36,16 @@ void AddQTerm(const PolicyLossOptions& options, const Categorical<Scalar>& polic
   result->loss -= result->value / scale;
 }
 
+// The mean entropy of the policy; adds the gradient of -weight times it, with respect to pi's probabilities,
+// to `gradient`. The missing +1 of log pi + 1 vanishes in SoftmaxGradient.
+template <class Scalar>
+Scalar AddEntropyTerm(const Categorical<Scalar>& policy, Scalar weight, VectorX<Scalar>* entropy,
+                      MatrixX<Scalar>* gradient) {
+  Entropy(policy, entropy);
+  *gradient += weight / static_cast<Scalar>(entropy->size()) * policy.log_probabilities;
+  return entropy->mean();
+}
+
 }  // namespace
 
 template <class Scalar>
@@ -46,6 +56,30 @@ void ExpectedTargetValue(const Categorical<Scalar>& policy, const ConstMatrixRef
                .colwise()
                .sum()
                .transpose();
+}
+
+template <class Scalar>
+void GreedyValue(const ConstMatrixRef<Scalar>& chooser, const ConstMatrixRef<Scalar>& judge,
+                 const ConstMatrixRef<Scalar>& masks, VectorX<Scalar>* value) {
+  value->resize(chooser.cols());
+  for (Eigen::Index j = 0; j < chooser.cols(); ++j) {
+    Eigen::Index best = -1;
+    for (Eigen::Index k = 0; k < chooser.rows(); ++k) {
+      if (masks(k, j) > 0 && (best < 0 || chooser(k, j) > chooser(best, j))) best = k;
+    }
+    (*value)[j] = best < 0 ? Scalar{0} : judge(best, j);
+  }
+}
+
+template <class Scalar>
+void ComputeAdvantages(const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar>& q2,
+                       const ConstMatrixRef<Scalar>& actions, const VectorX<Scalar>& value,
+                       std::vector<float>* advantages) {
+  advantages->resize(static_cast<std::size_t>(q1.cols()));
+  for (Eigen::Index j = 0; j < q1.cols(); ++j) {
+    const auto a = static_cast<Eigen::Index>(actions(0, j));
+    (*advantages)[static_cast<std::size_t>(j)] = static_cast<float>(std::min(q1(a, j), q2(a, j)) - value[j]);
+  }
 }
 
 template <class Scalar>
@@ -97,25 +131,57 @@ PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, cons
   *d_logits += alpha / n * workspace->d_plus;
   if (options.repel_negative && threshold.moved_by_minus) *d_logits -= alpha / n * workspace->d_minus;
 
-  Entropy(policy, &workspace->entropy);
-  result.entropy = workspace->entropy.mean();
   const auto entropy_weight = static_cast<Scalar>(options.entropy_weight);
+  result.entropy = AddEntropyTerm(policy, entropy_weight, &workspace->entropy, d_logits);
   result.loss -= entropy_weight * result.entropy;
-  *d_logits += entropy_weight / n * policy.log_probabilities;
   SoftmaxGradient(policy, d_logits);
   return result;
 }
 
-#define DBR_INSTANTIATE(Scalar)                                                                        \
-  template void ExpectedTargetValue<Scalar>(const Categorical<Scalar>&, const ConstMatrixRef<Scalar>&, \
-                                            const ConstMatrixRef<Scalar>&, Scalar, VectorX<Scalar>*);  \
-  template Scalar CriticLoss<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&,     \
-                                     const VectorX<Scalar>&, MatrixX<Scalar>*);                        \
-  template void Divergence<Scalar>(DbrConfig::Divergence, Scalar, const Categorical<Scalar>&,          \
-                                   const Categorical<Scalar>&, VectorX<Scalar>*, MatrixX<Scalar>*);    \
-  template PolicyLoss<Scalar> DualBehaviorPolicyLoss<Scalar>(                                          \
-      const PolicyLossOptions&, const Categorical<Scalar>&, const ConstMatrixRef<Scalar>&,             \
-      const ConstMatrixRef<Scalar>&, const Categorical<Scalar>&, const Categorical<Scalar>&, Scalar,   \
+template <class Scalar>
+SoftPolicyLoss<Scalar> DiscreteSoftPolicyLoss(const Categorical<Scalar>& policy,
+                                              const ConstMatrixRef<Scalar>& q1,
+                                              const ConstMatrixRef<Scalar>& q2, Scalar temperature,
+                                              VectorX<Scalar>* entropy, MatrixX<Scalar>* d_logits) {
+  SoftPolicyLoss<Scalar> result;
+  const auto n = static_cast<Scalar>(q1.cols());
+  *d_logits = -q1.cwiseMin(q2) / n;
+  result.value = -policy.probabilities.cwiseProduct(*d_logits).sum();
+  result.entropy = AddEntropyTerm(policy, temperature, entropy, d_logits);
+  result.loss = -result.value - temperature * result.entropy;
+  SoftmaxGradient(policy, d_logits);
+  return result;
+}
+
+template <class Scalar>
+Scalar MeanGreatestEntropy(const ConstMatrixRef<Scalar>& masks) {
+  Scalar sum = 0;
+  for (Eigen::Index j = 0; j < masks.cols(); ++j) {
+    const auto legal = (masks.col(j).array() > Scalar{0}).count();
+    if (legal > 0) sum += std::log(static_cast<Scalar>(legal));
+  }
+  return sum / static_cast<Scalar>(masks.cols());
+}
+
+#define DBR_INSTANTIATE(Scalar)                                                                         \
+  template void ExpectedTargetValue<Scalar>(const Categorical<Scalar>&, const ConstMatrixRef<Scalar>&,  \
+                                            const ConstMatrixRef<Scalar>&, Scalar, VectorX<Scalar>*);   \
+  template void GreedyValue<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&,       \
+                                    const ConstMatrixRef<Scalar>&, VectorX<Scalar>*);                   \
+  template void ComputeAdvantages<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&, \
+                                          const ConstMatrixRef<Scalar>&, const VectorX<Scalar>&,        \
+                                          std::vector<float>*);                                         \
+  template SoftPolicyLoss<Scalar> DiscreteSoftPolicyLoss<Scalar>(                                       \
+      const Categorical<Scalar>&, const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&, Scalar, \
+      VectorX<Scalar>*, MatrixX<Scalar>*);                                                              \
+  template Scalar MeanGreatestEntropy<Scalar>(const ConstMatrixRef<Scalar>&);                           \
+  template Scalar CriticLoss<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&,      \
+                                     const VectorX<Scalar>&, MatrixX<Scalar>*);                         \
+  template void Divergence<Scalar>(DbrConfig::Divergence, Scalar, const Categorical<Scalar>&,           \
+                                   const Categorical<Scalar>&, VectorX<Scalar>*, MatrixX<Scalar>*);     \
+  template PolicyLoss<Scalar> DualBehaviorPolicyLoss<Scalar>(                                           \
+      const PolicyLossOptions&, const Categorical<Scalar>&, const ConstMatrixRef<Scalar>&,              \
+      const ConstMatrixRef<Scalar>&, const Categorical<Scalar>&, const Categorical<Scalar>&, Scalar,    \
       PolicyLossWorkspace<Scalar>*, MatrixX<Scalar>*);
 
 DBR_INSTANTIATE(float)

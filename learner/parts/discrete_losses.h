@@ -1,9 +1,12 @@
-// The losses of discrete DBR as pure functions with hand-written gradients (docs/algorithms.md maps them to
-// the paper).
+// The losses over discrete actions as pure functions with hand-written gradients (docs/algorithms.md maps
+// them to their sources).
 #pragma once
+
+#include <vector>
 
 #include "core/batch.h"
 #include "learner/parts/dual_behavior.h"
+#include "learner/parts/soft_policy_loss.h"
 #include "nn/categorical.h"
 #include "nn/mlp.h"
 #include "proto/config.pb.h"
@@ -15,6 +18,19 @@ namespace dbr {
 template <class Scalar>
 void ExpectedTargetValue(const Categorical<Scalar>& policy, const ConstMatrixRef<Scalar>& q1,
                          const ConstMatrixRef<Scalar>& q2, Scalar min_weight, VectorX<Scalar>* value);
+
+// V(s) [n]: what `judge` says of the legal action that `chooser` finds the greatest, 0 where none is legal.
+// With the online network as the chooser and its target as the judge it is Double DQN's V'(s') (van Hasselt
+// et al. 2016, equation 4); with one network as both it is max_a Q(s, a). All [actions x n].
+template <class Scalar>
+void GreedyValue(const ConstMatrixRef<Scalar>& chooser, const ConstMatrixRef<Scalar>& judge,
+                 const ConstMatrixRef<Scalar>& masks, VectorX<Scalar>* value);
+
+// A = min_i Q_i(s, a) - V(s) of each transition; value [n] is V(s). `advantages` becomes of size n.
+template <class Scalar>
+void ComputeAdvantages(const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar>& q2,
+                       const ConstMatrixRef<Scalar>& actions, const VectorX<Scalar>& value,
+                       std::vector<float>* advantages);
 
 // The mean of (Q(s, a) - y)^2 over the batch and its gradient with respect to q [actions x n]; y is a
 // constant.
@@ -45,5 +61,19 @@ PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, cons
                                           const Categorical<Scalar>& beta_plus,
                                           const Categorical<Scalar>& beta_minus, Scalar alpha,
                                           PolicyLossWorkspace<Scalar>* workspace, MatrixX<Scalar>* d_logits);
+
+// Discrete SAC's policy loss E[sum_a pi(a|s) (temperature * log pi(a|s) - min_i Q_i(s, a))] (Christodoulou
+// 2019, equation 12), the smaller twin taken for each action, and its gradient with respect to the policy's
+// logits. q1, q2 [actions x n] and the temperature are constants. `entropy` [n] is a workspace.
+template <class Scalar>
+SoftPolicyLoss<Scalar> DiscreteSoftPolicyLoss(const Categorical<Scalar>& policy,
+                                              const ConstMatrixRef<Scalar>& q1,
+                                              const ConstMatrixRef<Scalar>& q2, Scalar temperature,
+                                              VectorX<Scalar>* entropy, MatrixX<Scalar>* d_logits);
+
+// The mean over the batch of log(number of legal actions), the greatest entropy that a policy can have there,
+// in nats. masks [actions x n]; a state without a legal action counts as 0.
+template <class Scalar>
+Scalar MeanGreatestEntropy(const ConstMatrixRef<Scalar>& masks);
 
 }  // namespace dbr

@@ -3,16 +3,10 @@
 
 #include "learner/parts/continuous_losses.h"
 #include "learner/parts/sampled_actions.h"
+#include "learner/parts/soft_policy_loss.h"
 #include "learner/parts/twin_critic.h"
 
 namespace dbr {
-
-template <class Scalar>
-struct SoftPolicyLoss {
-  Scalar loss = 0;
-  Scalar value = 0;    // E[min_i Q_i(s, a)]
-  Scalar entropy = 0;  // mean of -log pi(a|s) over the draws, nats
-};
 
 // Workspaces, reused from batch to batch.
 template <class Scalar>

@@ -65,6 +65,17 @@ AlgorithmSpec Sac(AlgorithmSpec spec) {
   return spec;
 }
 
+AlgorithmSpec Ddqn(AlgorithmSpec spec) {
+  spec.config.mutable_ddqn();
+  return spec;
+}
+
+AlgorithmSpec SacDiscrete(AlgorithmSpec spec) {
+  spec.config.mutable_sac_discrete();
+  spec.config.set_threads(1);
+  return spec;
+}
+
 AlgorithmSpec OnTwoThreads(AlgorithmSpec spec) {
   spec.config.set_threads(2);
   return spec;
@@ -92,6 +103,8 @@ void LearnerUpdate(benchmark::State& state, const AlgorithmSpec& spec) {
   BENCHMARK_CAPTURE(LearnerUpdate, , spec)->Name("LearnerUpdate/" name)->Unit(benchmark::kMillisecond)
 
 DBR_UPDATE("dbr/connect4", Dbr(Connect4()));
+DBR_UPDATE("ddqn/connect4", Ddqn(Connect4()));
+DBR_UPDATE("sac_discrete/connect4", SacDiscrete(Connect4()));
 DBR_UPDATE("sac/hopper", Sac(Hopper()));
 DBR_UPDATE("sac/ant", Sac(Ant()));
 DBR_UPDATE("dbr/hopper", Dbr(Hopper()));

@@ -1,4 +1,5 @@
-// The losses of discrete DBR: every gradient against central differences in double, through the networks too.
+// The losses over discrete actions: every gradient against central differences in double, through the
+// networks too.
 #include "learner/parts/discrete_losses.h"
 
 #include <gtest/gtest.h>
@@ -172,6 +173,98 @@ TEST(CriticLoss, GradientThroughTheNetworkAgreesWithDifferences) {
         return CriticLoss<double>(MlpForward<double>(shape, p.data(), x, &scratch), actions, y, &unused);
       },
       parameters);
+}
+
+class SoftPolicyLossTest : public testing::Test {
+ protected:
+  SoftPolicyLossTest() { masks_(3, 1) = masks_(0, 4) = 0; }
+
+  SoftPolicyLoss<double> Loss(const Matrix& logits, Matrix* gradient) const {
+    Vector workspace;
+    return DiscreteSoftPolicyLoss<double>(Softmax(logits, masks_), q1_, q2_, kTemperature, &workspace,
+                                          gradient);
+  }
+  double LossAlone(const Matrix& logits) const {
+    Matrix unused;
+    return Loss(logits, &unused).loss;
+  }
+
+  static constexpr double kTemperature = 0.3;
+  Rng rng_{12};
+  Matrix masks_ = Matrix::Ones(kActions, kStates);
+  Matrix q1_ = Uniform(kActions, kStates, rng_), q2_ = Uniform(kActions, kStates, rng_);
+};
+
+TEST_F(SoftPolicyLossTest, GradientAgreesWithDifferences) {
+  const Matrix logits = Uniform(kActions, kStates, rng_);
+  Matrix gradient;
+  Loss(logits, &gradient);
+  EXPECT_EQ(gradient(3, 1), 0);
+  ExpectIsGradient(
+      gradient, [&](const Matrix& z) { return LossAlone(z); }, logits);
+}
+
+TEST_F(SoftPolicyLossTest, GradientThroughTheNetworkAgreesWithDifferences) {
+  const MlpShape shape(kInputs, {5, 6}, kActions);
+  const Vector parameters = InitialParameters<double>(shape, rng_);
+  const Matrix x = Uniform(kInputs, kStates, rng_);
+  MlpActivations<double> activations;
+  Matrix d_logits;
+  Loss(MlpForward<double>(shape, parameters.data(), x, &activations), &d_logits);
+  Vector gradient;
+  MlpParameterGradient<double>(shape, parameters.data(), x, d_logits, &activations, &gradient);
+  ExpectIsGradient(
+      gradient,
+      [&](const Matrix& p) {
+        MlpActivations<double> scratch;
+        return LossAlone(MlpForward<double>(shape, p.data(), x, &scratch));
+      },
+      parameters);
+}
+
+TEST_F(SoftPolicyLossTest, TakesTheSmallerTwinOfEachAction) {
+  masks_ = Matrix::Ones(2, 1);
+  q1_.resize(2, 1);
+  q2_.resize(2, 1);
+  q1_ << 1, 4;
+  q2_ << 3, 2;
+  Matrix gradient;
+  const SoftPolicyLoss<double> loss = Loss(Matrix::Zero(2, 1), &gradient);
+  EXPECT_DOUBLE_EQ(loss.value, 0.5 * 1 + 0.5 * 2);
+  EXPECT_DOUBLE_EQ(loss.entropy, std::log(2));
+  EXPECT_DOUBLE_EQ(loss.loss, -1.5 - kTemperature * std::log(2));
+}
+
+TEST(GreedyValue, TheJudgeValuesWhatTheChooserFindsTheGreatestLegalAction) {
+  Matrix chooser(3, 2), judge(3, 2), masks = Matrix::Ones(3, 2);
+  chooser << 1, 1, 2, 2, 1e9, 3;
+  judge << 10, 10, 20, 20, 1e9, 30;
+  masks(2, 0) = 0;
+  Vector value;
+  GreedyValue<double>(chooser, judge, masks, &value);
+  EXPECT_EQ(value[0], 20);
+  EXPECT_EQ(value[1], 30);
+  GreedyValue<double>(chooser, judge, Matrix::Zero(3, 2), &value);
+  EXPECT_EQ(value, Vector::Zero(2)) << "a state without legal actions has no value";
+}
+
+TEST(Advantages, AreMeasuredFromTheValueByTheSmallerTwin) {
+  Matrix q1(2, 2), q2(2, 2), actions(1, 2);
+  q1 << 1, 4, 2, 5;
+  q2 << 3, 2, 0, 7;
+  actions << 0, 1;
+  Vector value(2);
+  value << 0.5, 6;
+  std::vector<float> advantages;
+  ComputeAdvantages<double>(q1, q2, actions, value, &advantages);
+  EXPECT_EQ(advantages, (std::vector<float>{0.5f, -1}));
+}
+
+TEST(MeanGreatestEntropy, IsTheLogOfTheNumberOfLegalActions) {
+  Matrix masks = Matrix::Ones(4, 3);
+  masks.col(1) << 0, 1, 0, 1;
+  masks.col(2).setZero();
+  EXPECT_DOUBLE_EQ(MeanGreatestEntropy<double>(masks), (std::log(4.0) + std::log(2.0)) / 3);
 }
 
 TEST(TargetValue, MixesTheTwinsUnderThePolicy) {

@@ -1,0 +1,68 @@
+#include "learner/algorithms/sac_discrete.h"
+
+#include "learner/algorithms/algorithm_adapter.h"
+#include "learner/parts/critic_target.h"
+#include "learner/parts/discrete_losses.h"
+
+namespace dbr {
+namespace {
+
+constexpr int kSmaller = 1;  // the weight of the smaller twin in a value: all
+
+}  // namespace
+
+template <class Scalar>
+SacDiscrete<Scalar>::SacDiscrete(const AlgorithmSpec& spec)
+    : spec_(spec),
+      init_rng_(spec.seed),
+      shape_(spec.observation_size, spec.hidden_sizes, spec.actions.size),
+      networks_(spec, spec.config.sac_discrete(), shape_, shape_, init_rng_),
+      metrics_(networks_.Metrics()) {}
+
+template <class Scalar>
+absl::Status SacDiscrete<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
+                                         const BasicBatch<Scalar>&) {
+  networks_.Begin(spec_.config);
+  ComputeTarget(uniform);
+  const Scalar critic_loss =
+      networks_.critics.Fit(uniform.observations, [&](const MatrixX<Scalar>& q, MatrixX<Scalar>* d_q) {
+        return CriticLoss<Scalar>(q, uniform.actions, target_, d_q);
+      });
+  const SoftPolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
+  const auto ratio = static_cast<Scalar>(spec_.config.sac_discrete().target_entropy_ratio());
+  networks_.Finish(spec_.config, policy_loss, ratio * MeanGreatestEntropy<Scalar>(uniform.masks));
+  return networks_.Report(critic_loss, policy_loss, target_.mean(), advantages_, &metrics_);
+}
+
+template <class Scalar>
+void SacDiscrete<Scalar>::ComputeTarget(const BasicBatch<Scalar>& batch) {
+  MaskedSoftmax<Scalar>(networks_.policy.Evaluate(batch.next_observations), batch.next_masks, &next_pi_);
+  networks_.critics.EvaluateTargets(batch.next_observations);
+  ExpectedTargetValue<Scalar>(next_pi_, networks_.critics.target1(), networks_.critics.target2(), kSmaller,
+                              &next_value_);
+  Entropy(next_pi_, &entropy_);
+  next_value_ += networks_.temperature.value() * entropy_;
+  CriticTarget(batch, spec_.config.reward_scale(), next_value_, &target_);
+}
+
+// And what every transition's advantage is.
+template <class Scalar>
+SoftPolicyLoss<Scalar> SacDiscrete<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
+  const MatrixX<Scalar>&q1 = networks_.critics.q1(), &q2 = networks_.critics.q2();
+  MaskedSoftmax<Scalar>(networks_.policy.Forward(batch.observations), batch.masks, &pi_);
+  const SoftPolicyLoss<Scalar> loss =
+      DiscreteSoftPolicyLoss<Scalar>(pi_, q1, q2, networks_.temperature.value(), &entropy_, &d_logits_);
+  networks_.policy.Step(batch.observations, d_logits_);
+  ExpectedTargetValue<Scalar>(pi_, q1, q2, kSmaller, &value_);
+  ComputeAdvantages<Scalar>(q1, q2, batch.actions, value_, &advantages_);
+  return loss;
+}
+
+template class SacDiscrete<float>;
+template class SacDiscrete<double>;
+
+std::unique_ptr<Algorithm> MakeSacDiscrete(const AlgorithmSpec& spec) {
+  return std::make_unique<AlgorithmAdapter<SacDiscrete>>(spec);
+}
+
+}  // namespace dbr

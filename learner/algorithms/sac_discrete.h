@@ -1,0 +1,63 @@
+// Soft Actor-Critic over discrete actions (Christodoulou 2019, "Soft Actor-Critic for Discrete Action
+// Settings").
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/rng.h"
+#include "learner/algorithm.h"
+#include "learner/parts/soft_networks.h"
+#include "nn/categorical.h"
+
+namespace dbr {
+
+// State: policy pi, twin critics with targets, a temperature. Expectations over actions are exact sums over
+// the legal ones. One update on a batch B drawn uniformly from D:
+//   1. y = r + discount * sum_a pi(a|s') (min_i Q'_i(s', a) - temperature * log pi(a|s')) (equation 10); each
+//      critic regresses on y.
+//   2. pi minimises E[sum_a pi(a|s) (temperature * log pi(a|s) - min_i Q_i(s, a))] (equation 12).
+//   3. The temperature rises where the entropy is below its target, and falls above it (equation 11). The
+//   target
+//      is target_entropy_ratio * log(number of legal actions) of each state, both averaged over B.
+//   4. Polyak averaging of the critics.
+//   5. A = min_i Q_i(s, a) - sum_a pi(a|s) min_i Q_i(s, a) of every transition of B.
+// Departures: steps 2 and 5 use the critics' values from before step 1's gradient step, and step 5 the
+// policy's from before step 2's, so that nothing is computed twice; the temperature is the exponential of
+// what Adam moves.
+template <class Scalar>
+class SacDiscrete {
+ public:
+  explicit SacDiscrete(const AlgorithmSpec& spec);
+
+  // `plus` and `minus` are not used.
+  absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
+                      const BasicBatch<Scalar>& minus);
+
+  BatchNeeds needs() const { return {.uniform = static_cast<int>(spec_.config.batch_size())}; }
+  const std::vector<float>& advantages() const { return advantages_; }
+  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
+  double UpdateFlops() const { return networks_.UpdateFlops(needs().uniform); }
+  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(spec_, snapshot); }
+  void Save(TensorFile* file) const { networks_.Save(file); }
+  absl::Status Load(const TensorFile& file) { return networks_.Load(file); }
+
+ private:
+  void ComputeTarget(const BasicBatch<Scalar>& batch);
+  SoftPolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
+
+  AlgorithmSpec spec_;
+  Rng init_rng_;
+  MlpShape shape_;
+  SoftNetworks<Scalar> networks_;
+
+  Categorical<Scalar> pi_, next_pi_;
+  VectorX<Scalar> next_value_, target_, value_, entropy_;  // [n]
+  MatrixX<Scalar> d_logits_;                               // [actions x n]
+  std::vector<float> advantages_;
+  std::vector<UpdateMetric> metrics_;
+};
+
+std::unique_ptr<Algorithm> MakeSacDiscrete(const AlgorithmSpec& spec);
+
+}  // namespace dbr
