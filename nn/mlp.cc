@@ -144,6 +144,17 @@ void MlpInputGradient(const MlpShape& shape, const Scalar* parameters, const Con
 }
 
 template <class Scalar>
+void MlpInputGradientOfDeltas(const MlpShape& shape, const Scalar* parameters,
+                              const ConstMatrixRef<Scalar>& dy, const MlpActivations<Scalar>& activations,
+                              MatrixX<Scalar>* dx) {
+  const Eigen::Index n = dy.cols();
+  const Operand<Scalar> delta =
+      shape.layer_count() == 1 ? ColumnsOf(dy, 0, n) : ColumnsOf<Scalar>(activations.deltas[0], 0, n);
+  dx->resize(shape.input_size(), n);
+  Product(Transposed(Weight(shape, parameters, 0)), delta, dx->data(), dx->rows());
+}
+
+template <class Scalar>
 VectorX<Scalar> InitialParameters(const MlpShape& shape, Rng& rng) {
   VectorX<Scalar> parameters(shape.parameter_count());
   for (int layer = 0; layer < shape.layer_count(); ++layer) {
@@ -170,6 +181,9 @@ void PolyakUpdate(const VectorX<Scalar>& online, Scalar tau, VectorX<Scalar>* ta
                                              VectorX<Scalar>*);                                             \
   template void MlpInputGradient<Scalar>(const MlpShape&, const Scalar*, const ConstMatrixRef<Scalar>&,     \
                                          MlpActivations<Scalar>*, MatrixX<Scalar>*);                        \
+  template void MlpInputGradientOfDeltas<Scalar>(const MlpShape&, const Scalar*,                            \
+                                                 const ConstMatrixRef<Scalar>&,                             \
+                                                 const MlpActivations<Scalar>&, MatrixX<Scalar>*);          \
   template VectorX<Scalar> InitialParameters<Scalar>(const MlpShape&, Rng&);                                \
   template void PolyakUpdate<Scalar>(const VectorX<Scalar>&, Scalar, VectorX<Scalar>*);
 

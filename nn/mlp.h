@@ -62,6 +62,12 @@ template <class Scalar>
 void MlpInputGradient(const MlpShape& shape, const Scalar* parameters, const ConstMatrixRef<Scalar>& dy,
                       MlpActivations<Scalar>* activations, MatrixX<Scalar>* dx);
 
+// The same straight after MlpParameterGradient for the same dy, from the deltas that it left: one product.
+template <class Scalar>
+void MlpInputGradientOfDeltas(const MlpShape& shape, const Scalar* parameters,
+                              const ConstMatrixRef<Scalar>& dy, const MlpActivations<Scalar>& activations,
+                              MatrixX<Scalar>* dx);
+
 // Weights and biases uniform in +-1/sqrt(fan-in), as PyTorch's linear layers start.
 template <class Scalar>
 VectorX<Scalar> InitialParameters(const MlpShape& shape, Rng& rng);

@@ -80,6 +80,10 @@ TEST_P(MlpDepth, GradientsAgreeWithDifferences) {
   MlpInputGradient<double>(shape, parameters.data(), dy, &activations, &dx);
   ExpectIsGradient(
       dx, [&](const Matrix& input) { return loss(parameters.data(), input); }, x);
+  Matrix dx_of_deltas;
+  MlpParameterGradient<double>(shape, parameters.data(), x, dy, &activations, &gradient);
+  MlpInputGradientOfDeltas<double>(shape, parameters.data(), dy, activations, &dx_of_deltas);
+  ExpectNear(dx_of_deltas, dx);
 }
 
 INSTANTIATE_TEST_SUITE_P(Depths, MlpDepth,
