@@ -30,6 +30,7 @@ inline constexpr char kCritic1[] = "critic_1";
 inline constexpr char kCritic2[] = "critic_2";
 inline constexpr char kBetaPlus[] = "beta_plus";
 inline constexpr char kBetaMinus[] = "beta_minus";
+inline constexpr char kBehavior[] = "behavior";  // beta, fitted to all of the data
 // Not a network: the mean of each feature, then one over its standard deviation; absent where the networks
 // take observations as they are.
 inline constexpr char kObservationNormalizer[] = "observation_normalizer";

@@ -73,6 +73,7 @@ absl::StatusOr<std::vector<ProbedPosition>> Probe(const PolicyNetworks& policy,
                  Column(view.policy, i),
                  Column(view.beta_plus, i),
                  Column(view.beta_minus, i),
+                 Column(view.beta, i),
                  Column(view.q, i)};
   }
   return probed;

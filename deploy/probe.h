@@ -21,6 +21,7 @@ struct ProbedPosition {
   std::vector<float> pi;
   std::vector<float> beta_plus;
   std::vector<float> beta_minus;
+  std::vector<float> beta;  // of an algorithm with one behaviour policy
   std::vector<float> q;
 };
 

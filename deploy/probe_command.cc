@@ -91,7 +91,7 @@ void AddProbe(CLI::App* app, int* exit_code) {
   command->add_flag(
       "--json", flags->json,
       "Print one JSON object: with a file {positions, must_block, must_win, keeps_value_decisive, best}, "
-      "with moves {moves, to_move, move, pi, beta_plus, beta_minus, q}");
+      "with moves {moves, to_move, move, pi, beta_plus, beta_minus, beta, q}");
   command->footer(
       "Examples:\n"
       "  dbr probe --policy runs/quickstart --moves 44536\n"

@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -16,6 +18,8 @@ using connect4::kColumns;
 using connect4::kRows;
 using Json = nlohmann::ordered_json;
 
+constexpr int kBar = 9;
+constexpr int kCellWidth = kBar + 8;
 constexpr const char* kStones[] = {"●", "○"};  // of the first and the second player
 
 // A value as a share of the bar: probabilities as they are, Q from its range [-1, 1].
@@ -26,13 +30,29 @@ double OfQ(float value) {
   return (value + 1.0) / 2;
 }
 
+// What is shown of a position, in order.
+struct Shown {
+  const char* name;
+  const std::vector<float>& values;
+  double (*fraction)(float);
+};
+std::vector<Shown> ShownOf(const ProbedPosition& probed) {
+  std::vector<Shown> shown = {{"pi", probed.pi, Probability}};
+  if (probed.beta.empty()) {
+    shown.push_back({"beta+", probed.beta_plus, Probability});
+    shown.push_back({"beta-", probed.beta_minus, Probability});
+  } else {
+    shown.push_back({"beta", probed.beta, Probability});
+  }
+  shown.push_back({"Q", probed.q, OfQ});
+  return shown;
+}
+
 std::string BarCell(const std::vector<float>& values, int column, bool legal, double (*fraction)(float)) {
-  constexpr int kBar = 9;
-  constexpr int kWidth = kBar + 8;
-  if (values.empty()) return PadRight("–", kWidth);
-  if (!legal) return PadRight("full", kWidth);
+  if (values.empty()) return PadRight("–", kCellWidth);
+  if (!legal) return PadRight("full", kCellWidth);
   return PadRight(absl::StrCat(Bar(fraction(values[column]), kBar), PadLeft(Fixed(values[column], 2), 6)),
-                  kWidth);
+                  kCellWidth);
 }
 
 std::string Sparks(const Board& board, const std::vector<float>& values, double (*fraction)(float)) {
@@ -84,14 +104,16 @@ std::string Figure(absl::string_view moves, const ProbedPosition& probed) {
       absl::StrCat(moves.empty() ? "the empty board" : absl::StrCat("after ", moves), ": player ", mover + 1,
                    " (", kStones[mover], ") to move, and the policy plays column ", probed.move + 1, "\n\n",
                    DrawBoard(board), "\n");
-  absl::StrAppend(&text, " column  ", PadRight("pi", 17), PadRight("beta+", 17), PadRight("beta-", 17),
-                  "Q, from -1 to 1\n");
+  const std::vector<Shown> shown = ShownOf(probed);
+  absl::StrAppend(&text, " column  ");
+  for (const Shown& network : shown) {
+    absl::StrAppend(&text,
+                    network.fraction == OfQ ? "Q, from -1 to 1\n" : PadRight(network.name, kCellWidth));
+  }
   for (int c = 0; c < kColumns; ++c) {
     const bool legal = board.IsLegal(c);
     std::string line = absl::StrCat("   ", c + 1, c == probed.move ? " ◀   " : "     ");
-    absl::StrAppend(&line, BarCell(probed.pi, c, legal, Probability),
-                    BarCell(probed.beta_plus, c, legal, Probability),
-                    BarCell(probed.beta_minus, c, legal, Probability), BarCell(probed.q, c, legal, OfQ));
+    for (const Shown& network : shown) line += BarCell(network.values, c, legal, network.fraction);
     absl::StrAppend(&text, line.substr(0, line.find_last_not_of(' ') + 1), "\n");
   }
   return text;
@@ -104,11 +126,14 @@ std::string FigureLine(const ReferencePosition& position, const ProbedPosition& 
                                                                  : "✗";
   std::string best;
   for (const int c : position.best) absl::StrAppend(&best, c);
-  return absl::StrCat(PadRight(position.id, 8), PadRight(position.kind, 12), "plays ", column, " ", verdict,
-                      "  best ", PadRight(best, 9), "pi ", Sparks(probed.board, probed.pi, Probability),
-                      "  beta+ ", Sparks(probed.board, probed.beta_plus, Probability), "  beta- ",
-                      Sparks(probed.board, probed.beta_minus, Probability), "  Q ",
-                      Sparks(probed.board, probed.q, OfQ));
+  std::string line = absl::StrCat(PadRight(position.id, 8), PadRight(position.kind, 12), "plays ", column,
+                                  " ", verdict, "  best ", PadRight(best, 9));
+  const char* separator = "";
+  for (const auto& [name, values, fraction] : ShownOf(probed)) {
+    absl::StrAppend(&line, separator, name, " ", Sparks(probed.board, values, fraction));
+    separator = "  ";
+  }
+  return line;
 }
 
 std::string SharesText(const ProbeShares& shares) {
@@ -125,6 +150,7 @@ Json ToJson(absl::string_view moves, const ProbedPosition& probed) {
           {"pi", PerColumn(probed.board, probed.pi)},
           {"beta_plus", PerColumn(probed.board, probed.beta_plus)},
           {"beta_minus", PerColumn(probed.board, probed.beta_minus)},
+          {"beta", PerColumn(probed.board, probed.beta)},
           {"q", PerColumn(probed.board, probed.q)}};
 }
 

@@ -79,7 +79,8 @@ class Algorithm {
   virtual absl::Status Load(const TensorFile& file) = 0;
 };
 
-// Makes the algorithm that spec.config names. InvalidArgument where it does not serve the action space.
+// Makes the algorithm that spec.config names. InvalidArgument, naming the field, where it, or the variant
+// that the config chooses, does not serve the action space.
 absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& spec);
 
 // Name of the algorithm that a config sets ("dbr").

@@ -73,9 +73,9 @@ void DiscreteActor::RunCritics(const PolicyNetworks& policy, const ConstMatrixRe
   }
 }
 
-void DiscreteActor::RunBehavior(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
-                                const ConstMatrixRef<float>& masks) {
-  if (policy.has_behavior()) {
+void DiscreteActor::RunDualBehavior(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
+                                    const ConstMatrixRef<float>& masks) {
+  if (policy.has_dual_behavior()) {
     RunCategorical(policy, kBetaPlus, observations, masks, &view_.beta_plus);
     RunCategorical(policy, kBetaMinus, observations, masks, &view_.beta_minus);
   } else {
@@ -87,13 +87,13 @@ void DiscreteActor::RunBehavior(const PolicyNetworks& policy, const ConstMatrixR
 absl::Status DiscreteActor::Act(const PolicyNetworks& policy, ActingMode mode,
                                 const ConstMatrixRef<float>& observations, const ConstMatrixRef<float>& masks,
                                 Rng& rng, Eigen::Ref<MatrixX<float>> actions) {
-  if (mode == SUPPORT && !policy.has_behavior()) {
+  if (mode == SUPPORT && !policy.has_dual_behavior()) {
     return absl::InvalidArgumentError(
         "the mode SUPPORT needs beta+ and beta- and the policy has none: use another mode");
   }
   RunCategorical(policy, kPolicyNetwork, observations, masks, &view_.policy);
   RunCritics(policy, observations);
-  if (mode == SUPPORT) RunBehavior(policy, observations, masks);
+  if (mode == SUPPORT) RunDualBehavior(policy, observations, masks);
   if (!view_.policy.allFinite() || !view_.q.allFinite()) {
     return absl::InternalError(absl::StrCat("policy version ", policy.snapshot().version,
                                             " gives values that are not finite. Use an earlier checkpoint."));
@@ -129,7 +129,12 @@ const PolicyView& DiscreteActor::View(const PolicyNetworks& policy, const ConstM
                                       const ConstMatrixRef<float>& masks) {
   RunCategorical(policy, kPolicyNetwork, observations, masks, &view_.policy);
   RunCritics(policy, observations);
-  RunBehavior(policy, observations, masks);
+  RunDualBehavior(policy, observations, masks);
+  if (policy.has_behavior()) {
+    RunCategorical(policy, kBehavior, observations, masks, &view_.beta);
+  } else {
+    view_.beta.resize(0, 0);
+  }
   return view_;
 }
 

@@ -25,8 +25,8 @@ class DiscreteActor {
                       const ConstMatrixRef<float>& observations, const ConstMatrixRef<float>& masks,
                       MatrixX<float>* probabilities);
   void RunCritics(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations);
-  void RunBehavior(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
-                   const ConstMatrixRef<float>& masks);
+  void RunDualBehavior(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
+                       const ConstMatrixRef<float>& masks);
 
   MlpActivations<float> activations_;
   Categorical<float> distribution_;

@@ -18,7 +18,8 @@ struct PolicyView {
   MatrixX<float> policy;
   MatrixX<float> beta_plus;
   MatrixX<float> beta_minus;
-  MatrixX<float> q;  // the smaller of the twins
+  MatrixX<float> beta;  // of an algorithm with one behaviour policy
+  MatrixX<float> q;     // the smaller of the twins
 };
 
 // Workspaces for one thread; allocates only when a batch is larger than any before.

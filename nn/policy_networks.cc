@@ -57,8 +57,12 @@ bool PolicyNetworks::has_critics() const {
   return snapshot_.Find(kCritic1) != nullptr && snapshot_.Find(kCritic2) != nullptr;
 }
 
-bool PolicyNetworks::has_behavior() const {
+bool PolicyNetworks::has_dual_behavior() const {
   return snapshot_.Find(kBetaPlus) != nullptr && snapshot_.Find(kBetaMinus) != nullptr;
+}
+
+bool PolicyNetworks::has_behavior() const {
+  return snapshot_.Find(kBehavior) != nullptr;
 }
 
 bool PolicyNetworks::Normalize(const ConstMatrixRef<float>& observations, MatrixX<float>* normalized) const {

@@ -29,7 +29,8 @@ class PolicyNetworks {
   const MlpShape& policy_shape() const { return policy_shape_; }
   const MlpShape& critic_shape() const { return critic_shape_; }
   bool has_critics() const;
-  bool has_behavior() const;  // beta+ and beta-
+  bool has_dual_behavior() const;  // beta+ and beta-
+  bool has_behavior() const;       // one beta of all the data
 
   // (observation - mean) / deviation [observation x n] where the policy was trained on that, else false.
   bool Normalize(const ConstMatrixRef<float>& observations, MatrixX<float>* normalized) const;

@@ -34,16 +34,13 @@ template <class Scalar>
 void ContinuousDbr<Scalar>::ComputeNextValue(const BasicBatch<Scalar>& batch) {
   const DbrConfig& config = spec_.config.dbr();
   const Eigen::Index n = batch.size();
-  next_pi_.Split(networks_.policy.ForwardTarget(batch.next_observations), kPolicyLogStd);
   FillNormal(rng_, spec_.actions.size, config.target_samples() * n, &next_noise_);
-  next_draws_.DrawActions(next_pi_, next_noise_);
-  networks_.critics.EvaluateTargets(next_draws_.CriticInput(batch.next_observations));
-  next_value_.resize(n);
-  GreatestTargetValue<Scalar>(networks_.critics.target1(), networks_.critics.target2(),
-                              static_cast<Scalar>(config.target_min_weight()), &next_value_);
+  next_value_ =
+      next_.Compute(batch.next_observations, next_noise_, static_cast<Scalar>(config.target_min_weight()),
+                    &networks_.policy, &networks_.critics);
   if (config.value_penalty()) {
     DrawDivergenceNoise(n);
-    penalty_.Compute({options_.divergence, options_.mmd_sigma}, next_pi_,
+    penalty_.Compute({options_.divergence, options_.mmd_sigma}, next_.pi(),
                      beta_plus_.At(batch.next_observations, &networks_.beta_plus), {noise_.pi, noise_.plus});
     next_value_ -= networks_.multiplier.value() * penalty_.value();
   }

@@ -10,6 +10,7 @@
 #include "learner/parts/dual_behavior_networks.h"
 #include "learner/parts/dual_behavior_objective.h"
 #include "learner/parts/gaussian_likelihood.h"
+#include "learner/parts/greatest_target.h"
 
 namespace dbr {
 
@@ -57,8 +58,8 @@ class ContinuousDbr {
 
   GaussianLikelihood<Scalar> beta_plus_{kBehaviorLogStd}, beta_minus_{kBehaviorLogStd};
   CriticRegression<Scalar> regression_;
-  GaussianHead<Scalar> pi_, next_pi_;
-  SampledActions<Scalar> next_draws_;
+  GaussianHead<Scalar> pi_;
+  GreatestTarget<Scalar> next_;
   DualBehaviorObjective<Scalar> objective_;
   GaussianDivergence<Scalar> penalty_;
   ObjectiveNoise<Scalar> noise_;

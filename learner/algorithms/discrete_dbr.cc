@@ -1,7 +1,5 @@
 #include "learner/algorithms/discrete_dbr.h"
 
-#include <cmath>
-
 #include "learner/algorithms/algorithm_adapter.h"
 #include "learner/parts/critic_target.h"
 
@@ -20,8 +18,8 @@ template <class Scalar>
 absl::Status DiscreteDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                                          const BasicBatch<Scalar>& minus) {
   networks_.Begin(spec_.config);
-  networks_.runner.Run([&] { FitBehavior(plus, &networks_.beta_plus, &beta_plus_); },
-                       [&] { FitBehavior(minus, &networks_.beta_minus, &beta_minus_); });
+  networks_.runner.Run([&] { beta_plus_.Fit(plus, &networks_.beta_plus); },
+                       [&] { beta_minus_.Fit(minus, &networks_.beta_minus); });
   ComputeTargets(uniform);
   const Scalar critic_loss =
       networks_.critics.Fit(uniform.observations, [&](const MatrixX<Scalar>& q, MatrixX<Scalar>* d_q) {
@@ -32,23 +30,8 @@ absl::Status DiscreteDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, cons
   ComputeAdvantages<Scalar>(networks_.critics.q1(), networks_.critics.q2(), uniform.actions, value_,
                             &advantages_);
   networks_.Finish(spec_.config, policy_loss);
-  return networks_.Report({critic_loss, beta_plus_.loss, beta_minus_.loss}, policy_loss, target_.mean(),
+  return networks_.Report({critic_loss, beta_plus_.loss(), beta_minus_.loss()}, policy_loss, target_.mean(),
                           advantages_, &metrics_);
-}
-
-template <class Scalar>
-void DiscreteDbr<Scalar>::FitBehavior(const BasicBatch<Scalar>& batch, TrainedNetwork<Scalar>* network,
-                                      Behavior* behavior) {
-  if (batch.size() == 0) return;
-  EvaluateBehavior(batch.observations, batch.masks, network, behavior);
-  behavior->loss = NegativeLogLikelihood<Scalar>(behavior->distribution, batch.actions, &behavior->d_logits);
-  network->Step(batch.observations, behavior->d_logits);
-}
-
-template <class Scalar>
-void DiscreteDbr<Scalar>::EvaluateBehavior(const MatrixX<Scalar>& observations, const MatrixX<Scalar>& masks,
-                                           TrainedNetwork<Scalar>* network, Behavior* behavior) {
-  MaskedSoftmax<Scalar>(network->Forward(observations), masks, &behavior->distribution);
 }
 
 template <class Scalar>
@@ -59,9 +42,9 @@ void DiscreteDbr<Scalar>::ComputeTargets(const BasicBatch<Scalar>& batch) {
   ExpectedTargetValue<Scalar>(next_pi_, networks_.critics.target1(), networks_.critics.target2(), min_weight,
                               &target_);
   if (spec_.config.dbr().value_penalty()) {
-    EvaluateBehavior(batch.next_observations, batch.next_masks, &networks_.beta_plus, &beta_plus_);
     Divergence<Scalar>(options_.divergence, static_cast<Scalar>(options_.mmd_sigma), next_pi_,
-                       beta_plus_.distribution, &penalty_, nullptr);
+                       beta_plus_.At(batch.next_observations, batch.next_masks, &networks_.beta_plus),
+                       &penalty_, nullptr);
     target_ -= networks_.multiplier.value() * penalty_;
   }
   CriticTarget(batch, spec_.config.reward_scale(), target_, &target_);
@@ -69,14 +52,13 @@ void DiscreteDbr<Scalar>::ComputeTargets(const BasicBatch<Scalar>& batch) {
 
 template <class Scalar>
 PolicyLoss<Scalar> DiscreteDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
-  networks_.runner.Run(
-      [&] { EvaluateBehavior(batch.observations, batch.masks, &networks_.beta_plus, &beta_plus_); },
-      [&] { EvaluateBehavior(batch.observations, batch.masks, &networks_.beta_minus, &beta_minus_); });
+  networks_.runner.Run([&] { beta_plus_.At(batch.observations, batch.masks, &networks_.beta_plus); },
+                       [&] { beta_minus_.At(batch.observations, batch.masks, &networks_.beta_minus); });
   MaskedSoftmax<Scalar>(networks_.policy.Forward(batch.observations), batch.masks, &pi_);
   options_.use_q = networks_.updates >= spec_.config.dbr().warm_start_updates();
   const PolicyLoss<Scalar> loss = DualBehaviorPolicyLoss<Scalar>(
-      options_, pi_, networks_.critics.q1(), networks_.critics.q2(), beta_plus_.distribution,
-      beta_minus_.distribution, networks_.multiplier.value(), &workspace_, &d_logits_);
+      options_, pi_, networks_.critics.q1(), networks_.critics.q2(), beta_plus_.distribution(),
+      beta_minus_.distribution(), networks_.multiplier.value(), &workspace_, &d_logits_);
   networks_.policy.Step(batch.observations, d_logits_);
   return loss;
 }

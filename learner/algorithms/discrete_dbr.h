@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "learner/algorithm.h"
+#include "learner/parts/categorical_likelihood.h"
 #include "learner/parts/discrete_losses.h"
 #include "learner/parts/dual_behavior_networks.h"
 
@@ -45,17 +46,6 @@ class DiscreteDbr {
   absl::Status Load(const TensorFile& file);
 
  private:
-  // Workspaces of a behaviour policy.
-  struct Behavior {
-    Categorical<Scalar> distribution;  // at the states of the newest use
-    MatrixX<Scalar> d_logits;          // [actions x n]
-    Scalar loss = 0;                   // mean of -log beta(a|s) in the newest fit
-  };
-
-  static void FitBehavior(const BasicBatch<Scalar>& batch, TrainedNetwork<Scalar>* network,
-                          Behavior* behavior);
-  static void EvaluateBehavior(const MatrixX<Scalar>& observations, const MatrixX<Scalar>& masks,
-                               TrainedNetwork<Scalar>* network, Behavior* behavior);
   void ComputeTargets(const BasicBatch<Scalar>& batch);
   PolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
 
@@ -66,7 +56,7 @@ class DiscreteDbr {
   MlpShape shape_;
   DualBehaviorNetworks<Scalar> networks_;
 
-  Behavior beta_plus_, beta_minus_;
+  CategoricalLikelihood<Scalar> beta_plus_, beta_minus_;
   Categorical<Scalar> pi_, next_pi_;
   PolicyLossWorkspace<Scalar> workspace_;
   VectorX<Scalar> target_, penalty_, value_;

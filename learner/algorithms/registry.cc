@@ -2,8 +2,10 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "learner/algorithm.h"
+#include "learner/algorithms/continuous_bear.h"
 #include "learner/algorithms/continuous_dbr.h"
 #include "learner/algorithms/ddqn.h"
+#include "learner/algorithms/discrete_bear.h"
 #include "learner/algorithms/discrete_dbr.h"
 #include "learner/algorithms/normalized.h"
 #include "learner/algorithms/sac.h"
@@ -19,15 +21,21 @@ struct Entry {
   std::unique_ptr<Algorithm> (*make)(const AlgorithmSpec&);
   const char* source;    // the publication
   const char* variants;  // the fields of its config message that choose between variants
+  // InvalidArgument where a variant does not serve these actions; null: all do.
+  absl::Status (*check)(const AlgorithmSpec&) = nullptr;
 };
 
 constexpr char kDbrSource[] = "Siu, Traish, Xu 2021";
 constexpr char kDbrVariants[] =
     "constraint, divergence, advantage, repel_negative, value_penalty, munchausen_weight";
+constexpr char kBearSource[] = "Kumar et al. 2019";
 
 constexpr Entry kAlgorithms[] = {
     {"dbr", AlgorithmConfig::kDbr, ActionKind::kDiscrete, MakeDiscreteDbr, kDbrSource, kDbrVariants},
     {"dbr", AlgorithmConfig::kDbr, ActionKind::kContinuous, MakeContinuousDbr, kDbrSource, kDbrVariants},
+    {"bear", AlgorithmConfig::kBear, ActionKind::kDiscrete, MakeDiscreteBear, kBearSource, "divergence"},
+    {"bear", AlgorithmConfig::kBear, ActionKind::kContinuous, MakeContinuousBear, kBearSource, "divergence",
+     CheckContinuousBear},
     {"sac", AlgorithmConfig::kSac, ActionKind::kContinuous, MakeSac, "Haarnoja et al. 2018", ""},
     {"ddqn", AlgorithmConfig::kDdqn, ActionKind::kDiscrete, MakeDdqn, "van Hasselt et al. 2016", ""},
     {"sac_discrete", AlgorithmConfig::kSacDiscrete, ActionKind::kDiscrete, MakeSacDiscrete,
@@ -60,6 +68,9 @@ absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& sp
     if (entry.actions != spec.actions.kind) continue;
     serving.push_back(entry.name);
     if (entry.config_case != spec.config.algorithm_case()) continue;
+    if (entry.check != nullptr) {
+      if (absl::Status status = entry.check(spec); !status.ok()) return status;
+    }
     std::unique_ptr<Algorithm> algorithm = entry.make(spec);
     return spec.normalize_observations ? Normalized(spec, std::move(algorithm)) : std::move(algorithm);
   }

@@ -12,9 +12,9 @@ namespace {
 // Adds -E[min_i sum_a pi Q_i] / scale to the loss and its gradient with respect to pi's probabilities to
 // `gradient`.
 template <class Scalar>
-void AddQTerm(const PolicyLossOptions& options, const Categorical<Scalar>& policy,
-              const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar>& q2, PolicyLoss<Scalar>* result,
-              MatrixX<Scalar>* gradient) {
+void AddQTerm(const PolicyLossOptions& options, const ValuedPolicy<Scalar>& at,
+              ConstrainedLoss<Scalar>* result, MatrixX<Scalar>* gradient) {
+  const auto& [policy, q1, q2] = at;
   const Eigen::Index n = q1.cols();
   Scalar sum = 0, size = 0;
   for (Eigen::Index j = 0; j < n; ++j) {
@@ -110,32 +110,54 @@ void Divergence(DbrConfig::Divergence kind, Scalar mmd_sigma, const Categorical<
 }
 
 template <class Scalar>
-PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, const Categorical<Scalar>& policy,
-                                          const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar>& q2,
-                                          const Categorical<Scalar>& beta_plus,
-                                          const Categorical<Scalar>& beta_minus, Scalar alpha,
-                                          PolicyLossWorkspace<Scalar>* workspace, MatrixX<Scalar>* d_logits) {
-  PolicyLoss<Scalar> result;
+ConstrainedLoss<Scalar> ConstrainedPolicyLoss(const PolicyLossOptions& options,
+                                              const ValuedPolicy<Scalar>& at,
+                                              const BehaviorConstraint<Scalar>& constraint,
+                                              PolicyLossWorkspace<Scalar>* workspace,
+                                              MatrixX<Scalar>* d_logits) {
+  ConstrainedLoss<Scalar> result;
+  const Categorical<Scalar>& policy = at.policy;
   const auto n = static_cast<Scalar>(policy.probabilities.cols());
   d_logits->setZero(policy.probabilities.rows(), policy.probabilities.cols());
-  AddQTerm(options, policy, q1, q2, &result, d_logits);
+  AddQTerm(options, at, &result, d_logits);
 
-  const auto sigma = static_cast<Scalar>(options.mmd_sigma), epsilon = static_cast<Scalar>(options.epsilon);
-  Divergence(options.divergence, sigma, policy, beta_plus, &workspace->plus, &workspace->d_plus);
-  Divergence(options.divergence, sigma, policy, beta_minus, &workspace->minus, &workspace->d_minus);
-  result.divergence_plus = workspace->plus.mean();
-  result.divergence_minus = workspace->minus.mean();
-  const Threshold<Scalar> threshold = ThresholdOf(options.constraint, epsilon, result.divergence_minus);
-  result.threshold = threshold.value;
-  result.loss += alpha * (result.divergence_plus - result.threshold);
-  *d_logits += alpha / n * workspace->d_plus;
-  if (options.repel_negative && threshold.moved_by_minus) *d_logits -= alpha / n * workspace->d_minus;
+  Divergence(options.divergence, static_cast<Scalar>(options.mmd_sigma), policy, constraint.beta,
+             &workspace->plus, &workspace->d_plus);
+  result.divergence = workspace->plus.mean();
+  result.threshold = constraint.threshold;
+  result.loss += constraint.alpha * (result.divergence - result.threshold);
+  *d_logits += constraint.alpha / n * workspace->d_plus;
 
   const auto entropy_weight = static_cast<Scalar>(options.entropy_weight);
   result.entropy = AddEntropyTerm(policy, entropy_weight, &workspace->entropy, d_logits);
   result.loss -= entropy_weight * result.entropy;
   SoftmaxGradient(policy, d_logits);
   return result;
+}
+
+template <class Scalar>
+PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, const Categorical<Scalar>& policy,
+                                          const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar>& q2,
+                                          const Categorical<Scalar>& beta_plus,
+                                          const Categorical<Scalar>& beta_minus, Scalar alpha,
+                                          PolicyLossWorkspace<Scalar>* workspace, MatrixX<Scalar>* d_logits) {
+  Divergence(options.divergence, static_cast<Scalar>(options.mmd_sigma), policy, beta_minus,
+             &workspace->minus, &workspace->d_minus);
+  const Scalar divergence_minus = workspace->minus.mean();
+  const Threshold<Scalar> threshold =
+      ThresholdOf(options.constraint, static_cast<Scalar>(options.epsilon), divergence_minus);
+  const ConstrainedLoss<Scalar> loss = ConstrainedPolicyLoss<Scalar>(
+      options, {policy, q1, q2}, {beta_plus, threshold.value, alpha}, workspace, d_logits);
+  if (options.repel_negative && threshold.moved_by_minus) {
+    SoftmaxGradient(policy, &workspace->d_minus);
+    *d_logits -= alpha / static_cast<Scalar>(policy.probabilities.cols()) * workspace->d_minus;
+  }
+  return {.loss = loss.loss,
+          .value = loss.value,
+          .divergence_plus = loss.divergence,
+          .divergence_minus = divergence_minus,
+          .threshold = loss.threshold,
+          .entropy = loss.entropy};
 }
 
 template <class Scalar>
@@ -179,6 +201,9 @@ Scalar MeanGreatestEntropy(const ConstMatrixRef<Scalar>& masks) {
                                      const VectorX<Scalar>&, MatrixX<Scalar>*);                         \
   template void Divergence<Scalar>(DbrConfig::Divergence, Scalar, const Categorical<Scalar>&,           \
                                    const Categorical<Scalar>&, VectorX<Scalar>*, MatrixX<Scalar>*);     \
+  template ConstrainedLoss<Scalar> ConstrainedPolicyLoss<Scalar>(                                       \
+      const PolicyLossOptions&, const ValuedPolicy<Scalar>&, const BehaviorConstraint<Scalar>&,         \
+      PolicyLossWorkspace<Scalar>*, MatrixX<Scalar>*);                                                  \
   template PolicyLoss<Scalar> DualBehaviorPolicyLoss<Scalar>(                                           \
       const PolicyLossOptions&, const Categorical<Scalar>&, const ConstMatrixRef<Scalar>&,              \
       const ConstMatrixRef<Scalar>&, const Categorical<Scalar>&, const Categorical<Scalar>&, Scalar,    \

@@ -44,17 +44,41 @@ template <class Scalar>
 void Divergence(DbrConfig::Divergence kind, Scalar mmd_sigma, const Categorical<Scalar>& p,
                 const Categorical<Scalar>& q, VectorX<Scalar>* divergence, MatrixX<Scalar>* d_probabilities);
 
-// Workspaces of DualBehaviorPolicyLoss; reused from batch to batch.
+// Workspaces of the policy losses; reused from batch to batch.
 template <class Scalar>
 struct PolicyLossWorkspace {
   MatrixX<Scalar> d_plus, d_minus;       // [actions x n]
   VectorX<Scalar> plus, minus, entropy;  // [n]
 };
 
+// A policy with the twins' values at the states of a batch.
+template <class Scalar>
+struct ValuedPolicy {
+  const Categorical<Scalar>& policy;
+  ConstMatrixRef<Scalar> q1, q2;  // [actions x n]
+};
+
+// D(pi, beta) <= threshold, with its multiplier.
+template <class Scalar>
+struct BehaviorConstraint {
+  const Categorical<Scalar>& beta;
+  Scalar threshold;  // c
+  Scalar alpha;
+};
+
+// -E[min_i sum_a pi Q_i] / scale - w H(pi) + alpha * (D(pi, beta) - c), BEAR's policy loss
+// (docs/algorithms.md), and its gradient with respect to the policy's logits. All but the policy are
+// constants, the scale of normalize_q (the mean of |Q| over the batch) too.
+template <class Scalar>
+ConstrainedLoss<Scalar> ConstrainedPolicyLoss(const PolicyLossOptions& options,
+                                              const ValuedPolicy<Scalar>& at,
+                                              const BehaviorConstraint<Scalar>& constraint,
+                                              PolicyLossWorkspace<Scalar>* workspace,
+                                              MatrixX<Scalar>* d_logits);
+
 // DBR's policy loss: -E[min_i sum_a pi Q_i] / scale - w H(pi) + alpha * (D(pi, beta+) - c), c by
 // options.constraint (docs/algorithms.md, DBR step 3), and its gradient with respect to the policy's logits.
-// q1, q2, beta+, beta- and the scale of normalize_q (the mean of |Q| over the batch) are constants; so is c
-// unless repel_negative.
+// q1, q2, beta+, beta- and the scale are constants; so is c unless repel_negative.
 template <class Scalar>
 PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, const Categorical<Scalar>& policy,
                                           const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar>& q2,

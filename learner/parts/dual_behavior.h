@@ -1,5 +1,5 @@
 // What DBR over discrete and over continuous actions have in common: its draws, the options and the figures
-// of its policy loss, and the constraint's threshold.
+// of its policy loss, and the constraint's threshold. BEAR shares the options: its constraint is FIXED.
 #pragma once
 
 #include "learner/algorithm.h"
@@ -35,6 +35,24 @@ struct PolicyLossOptions {
             .entropy_weight = config.entropy_weight(),
             .use_q = config.warm_start_updates() == 0};
   }
+  static PolicyLossOptions Of(const BearConfig& config) {
+    return {.constraint = DbrConfig::FIXED,
+            .divergence = config.divergence(),
+            .epsilon = config.epsilon(),
+            .mmd_sigma = config.mmd_sigma(),
+            .entropy_weight = config.entropy_weight(),
+            .use_q = config.warm_start_updates() == 0};
+  }
+};
+
+// Of a policy loss with a constraint D(pi, beta) <= c on one behaviour policy.
+template <class Scalar>
+struct ConstrainedLoss {
+  Scalar loss = 0;        // the objective with alpha as a constant
+  Scalar value = 0;       // E[min_i E_pi Q_i(s, a)]
+  Scalar divergence = 0;  // mean D(pi, beta)
+  Scalar threshold = 0;   // c
+  Scalar entropy = 0;     // mean, nats
 };
 
 template <class Scalar>

@@ -4,7 +4,7 @@
 #include "learner/parts/continuous_losses.h"
 #include "learner/parts/dual_behavior.h"
 #include "learner/parts/gaussian_divergence.h"
-#include "learner/parts/sampled_actions.h"
+#include "learner/parts/sampled_q_objective.h"
 #include "learner/parts/twin_critic.h"
 
 namespace dbr {
@@ -42,15 +42,10 @@ class DualBehaviorObjective {
   }
 
  private:
-  void AddQTerm(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
-                const MatrixX<Scalar>& observations, const ObjectiveNoise<Scalar>& noise,
-                TwinCritic<Scalar>* critics, PolicyLoss<Scalar>* result);
   void AddConstraint(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
                      const ObjectiveNoise<Scalar>& noise, Scalar alpha, PolicyLoss<Scalar>* result);
 
-  SampledActions<Scalar> samples_;
-  QTerm<Scalar> q_term_;
-  VectorX<Scalar> d_log_prob_;
+  SampledQObjective<Scalar> q_objective_;
   GaussianDivergence<Scalar> plus_, minus_;
   GaussianGradient<Scalar> gradient_;
 };

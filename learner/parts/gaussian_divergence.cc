@@ -32,26 +32,29 @@ void GaussianDivergence<Scalar>::Compute(const GaussianDivergenceOptions& option
       ExactMmd<Scalar>(pi.view(), beta.view(), options.mmd_sigma, &value_, &gradient_);
       return;
     case DbrConfig::MMD_LAPLACIAN:
-      return ComputeSampled({KernelKind::kLaplacian, options.mmd_sigma}, pi, beta, noise);
     case DbrConfig::MMD_GAUSSIAN:
-      return ComputeSampled({KernelKind::kGaussian, options.mmd_sigma}, pi, beta, noise);
+      Spread(beta, noise.beta, &beta_samples_);
+      ComputeFrom(options, pi, noise.pi, beta_samples_);
   }
 }
 
 template <class Scalar>
-void GaussianDivergence<Scalar>::ComputeSampled(const Kernel& kernel, const GaussianHead<Scalar>& pi,
-                                                const GaussianHead<Scalar>& beta, const Noise& noise) {
+void GaussianDivergence<Scalar>::ComputeFrom(const GaussianDivergenceOptions& options,
+                                             const GaussianHead<Scalar>& pi, const MatrixX<Scalar>& pi_noise,
+                                             const MatrixX<Scalar>& beta_samples) {
   const Eigen::Index n = pi.mean().cols();
-  DBR_CHECK(noise.pi.cols() % n == 0 && noise.beta.cols() % n == 0 && noise.pi.cols() > 0);
-  Spread(pi, noise.pi, &pi_samples_);
-  Spread(beta, noise.beta, &beta_samples_);
-  SampledMmd<Scalar>({pi_samples_, beta_samples_, n}, kernel, &value_, &d_samples_);
-  const Eigen::Index count = noise.pi.cols() / n;
+  DBR_CHECK(IsSampled(options.kind) && pi_noise.cols() % n == 0 && beta_samples.cols() % n == 0 &&
+            pi_noise.cols() > 0);
+  const KernelKind kernel =
+      options.kind == DbrConfig::MMD_GAUSSIAN ? KernelKind::kGaussian : KernelKind::kLaplacian;
+  Spread(pi, pi_noise, &pi_samples_);
+  SampledMmd<Scalar>({pi_samples_, beta_samples, n}, {kernel, options.mmd_sigma}, &value_, &d_samples_);
+  const Eigen::Index count = pi_noise.cols() / n;
   gradient_.mean.setZero(pi.mean().rows(), n);
   gradient_.log_std.setZero(pi.mean().rows(), n);
   for (Eigen::Index j = 0; j < d_samples_.cols(); ++j) {
     gradient_.mean.col(j / count) += d_samples_.col(j);
-    gradient_.log_std.col(j / count) += d_samples_.col(j).cwiseProduct(noise.pi.col(j));
+    gradient_.log_std.col(j / count) += d_samples_.col(j).cwiseProduct(pi_noise.col(j));
   }
   gradient_.log_std.array() *= pi.log_std().array().exp();
 }

@@ -33,13 +33,21 @@ class GaussianDivergence {
   void Compute(const GaussianDivergenceOptions& options, const GaussianHead<Scalar>& pi,
                const GaussianHead<Scalar>& beta, const Noise& noise);
 
+  // The same for a beta that is known by samples alone, [dimensions x n * samples] before the tanh, laid out
+  // as the noise of pi; options.kind is a sampled one.
+  void ComputeFrom(const GaussianDivergenceOptions& options, const GaussianHead<Scalar>& pi,
+                   const MatrixX<Scalar>& pi_noise, const MatrixX<Scalar>& beta_samples);
+
+  // Adds weight times gradient() to `sum`.
+  void AddGradient(Scalar weight, GaussianGradient<Scalar>* sum) const {
+    sum->mean += weight * gradient_.mean;
+    sum->log_std += weight * gradient_.log_std;
+  }
+
   const VectorX<Scalar>& value() const { return value_; }
   const GaussianGradient<Scalar>& gradient() const { return gradient_; }
 
  private:
-  void ComputeSampled(const Kernel& kernel, const GaussianHead<Scalar>& pi, const GaussianHead<Scalar>& beta,
-                      const Noise& noise);
-
   VectorX<Scalar> value_;
   GaussianGradient<Scalar> gradient_;
   MatrixX<Scalar> pi_samples_, beta_samples_, d_samples_;

@@ -1,8 +1,7 @@
 // SAC's policy loss with its gradient.
 #pragma once
 
-#include "learner/parts/continuous_losses.h"
-#include "learner/parts/sampled_actions.h"
+#include "learner/parts/sampled_q_objective.h"
 #include "learner/parts/soft_policy_loss.h"
 #include "learner/parts/twin_critic.h"
 
@@ -18,23 +17,14 @@ class SoftPolicyObjective {
   SoftPolicyLoss<Scalar> Compute(const GaussianHead<Scalar>& pi, const MatrixX<Scalar>& observations,
                                  const MatrixX<Scalar>& noise, Scalar temperature,
                                  TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output) {
-    const Eigen::Index n = observations.cols();
-    draws_.Draw(pi, noise);
-    critics->Evaluate(draws_.CriticInput(observations));
-    SmallerMeanQTerm<Scalar>({}, critics->value1(), critics->value2(), n, &q_term_);
-    d_log_prob_.setConstant(n, temperature / static_cast<Scalar>(n));
-    gradient_.mean.setZero(noise.rows(), n);
-    gradient_.log_std.setZero(noise.rows(), n);
-    draws_.Backprop(critics->InputGradient(q_term_.d_q1, q_term_.d_q2), d_log_prob_, &gradient_);
+    const SoftPolicyLoss<Scalar> loss =
+        q_objective_.Compute({.entropy_weight = temperature}, {pi, observations, noise}, critics, &gradient_);
     pi.Join(gradient_, d_output);
-    const Scalar entropy = -draws_.sample().log_prob.mean();
-    return {q_term_.loss - temperature * entropy, q_term_.value, entropy};
+    return loss;
   }
 
  private:
-  SampledActions<Scalar> draws_;
-  QTerm<Scalar> q_term_;
-  VectorX<Scalar> d_log_prob_;
+  SampledQObjective<Scalar> q_objective_;
   GaussianGradient<Scalar> gradient_;
 };
 

@@ -29,6 +29,8 @@ class TrainedNetwork {
   const VectorX<Scalar>& parameters() const { return parameters_; }
   const VectorX<Scalar>& target() const { return target_; }
   const VectorX<Scalar>& gradient() const { return gradient_; }
+  // For a caller that computes the gradient itself and then steps by ApplyGradient.
+  VectorX<Scalar>& gradient() { return gradient_; }
 
   // [output x n] of the online network; keeps what Step needs.
   const MatrixX<Scalar>& Forward(const ConstMatrixRef<Scalar>& x) {
@@ -57,8 +59,10 @@ class TrainedNetwork {
   // ComputeGradient, then one Adam step.
   void Step(const ConstMatrixRef<Scalar>& x, const ConstMatrixRef<Scalar>& d_output) {
     ComputeGradient(x, d_output);
-    adam_.Step(gradient_, &parameters_);
+    ApplyGradient();
   }
+  // One Adam step on gradient().
+  void ApplyGradient() { adam_.Step(gradient_, &parameters_); }
   void set_learning_rate(double learning_rate) { adam_.set_learning_rate(learning_rate); }
   void UpdateTarget(double tau) { PolyakUpdate(parameters_, static_cast<Scalar>(tau), &target_); }
 

@@ -76,6 +76,12 @@ AlgorithmSpec SacDiscrete(AlgorithmSpec spec) {
   return spec;
 }
 
+AlgorithmSpec Bear(AlgorithmSpec spec) {
+  spec.config.mutable_bear()->set_warm_start_updates(0);
+  spec.config.set_threads(1);
+  return spec;
+}
+
 AlgorithmSpec OnTwoThreads(AlgorithmSpec spec) {
   spec.config.set_threads(2);
   return spec;
@@ -109,6 +115,8 @@ DBR_UPDATE("sac/hopper", Sac(Hopper()));
 DBR_UPDATE("sac/ant", Sac(Ant()));
 DBR_UPDATE("dbr/hopper", Dbr(Hopper()));
 DBR_UPDATE("dbr/ant", Dbr(Ant()));
+DBR_UPDATE("bear/connect4", Bear(Connect4()));
+DBR_UPDATE("bear/ant", Bear(Ant()));
 // In wall-clock time; beside them the same on one thread.
 DBR_UPDATE("sac/ant/one_thread", Sac(Ant()))->UseRealTime();
 DBR_UPDATE("dbr/ant/one_thread", Dbr(Ant()))->UseRealTime();

@@ -28,6 +28,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::SizeIs;
 using Json = nlohmann::ordered_json;
 
@@ -185,6 +186,19 @@ TEST(FigureTest, DrawsTheBoardAndTheBars) {
                             HasSubstr("beta-"), HasSubstr("0.50")));
 }
 
+TEST(FigureTest, ShowsOneBehaviourInPlaceOfTwo) {
+  const auto policy = RightmostPolicy({kPolicyNetwork, kCritic1, kCritic2, kBehavior});
+  const auto probed = Probe(*policy, {Board()}, MODE, 1);
+  ASSERT_TRUE(probed.ok()) << probed.status();
+  EXPECT_THAT((*probed)[0].beta, SizeIs(7));
+  EXPECT_THAT(Figure("", (*probed)[0]), AllOf(HasSubstr("beta "), Not(HasSubstr("beta+"))));
+  EXPECT_THAT(FigureLine(Position("", 0, {7}, {7}), (*probed)[0]),
+              AllOf(HasSubstr("│  beta │"), Not(HasSubstr("beta-"))));
+  const Json json = ToJson("", (*probed)[0]);
+  EXPECT_GT(json["beta"][6].get<double>(), json["beta"][0].get<double>());
+  EXPECT_TRUE(json["beta_plus"].is_null());
+}
+
 TEST(FigureTest, OneLineHasTheVerdict) {
   const auto probed = Probe(*FullPolicy(), {Board()}, MODE, 1);
   EXPECT_THAT(FigureLine(Position("", 0, {7}, {7}), (*probed)[0]), HasSubstr("plays 7 ✓"));
@@ -204,6 +218,7 @@ TEST(FigureTest, JsonHasNullForAFullColumn) {
   EXPECT_TRUE(json["pi"][6].is_null());
   EXPECT_TRUE(json["q"][6].is_null());
   EXPECT_TRUE(json["beta_plus"].is_null());
+  EXPECT_TRUE(json["beta"].is_null());
   EXPECT_NEAR(json["q"][5].get<double>(), 0.5, 1e-6);
 }
 

@@ -23,6 +23,11 @@ AlgorithmSpec SpecOf(const AlgorithmId& id, std::uint64_t seed = 1) {
   if (id.name == "sac") spec.config.mutable_sac();
   if (id.name == "ddqn") spec.config.mutable_ddqn();
   if (id.name == "sac_discrete") spec.config.mutable_sac_discrete();
+  if (id.name == "bear") {
+    BearConfig* bear = spec.config.mutable_bear();
+    bear->set_warm_start_updates(2);
+    bear->add_vae_hidden_sizes(8);
+  }
   EXPECT_EQ(AlgorithmName(spec.config), id.name) << "give the new algorithm its config here";
   return spec;
 }

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "core/rng.h"
+#include "learner/parts/bear_objective.h"
 #include "learner/parts/dual_behavior_objective.h"
 #include "learner/parts/soft_policy_objective.h"
 #include "tests/numeric.h"
@@ -99,6 +100,39 @@ TEST(SoftPolicyObjectiveTest, GradientMatchesDifferences) {
   ExpectIsGradient(
       gradient, [&](const Matrix& at) { return loss(at, &unused).loss; }, output);
 }
+
+class BearObjectiveTest : public testing::TestWithParam<DbrConfig::Divergence> {};
+
+TEST_P(BearObjectiveTest, GradientMatchesDifferences) {
+  Rng rng(6);
+  PairRunner runner(1);
+  TwinCritic<double> critics(MlpShape(kObservation + kDimensions, {6, 6}, 1), 1e-3, rng, &runner);
+  const Matrix observations = Normal(kObservation, kStates, rng);
+  const Matrix actions = Normal(kDimensions, kDraws * kStates, rng);
+  const Matrix noise = Normal(kDimensions, kDivergenceSamples * kStates, rng);
+  const Matrix behavior = Normal(kDimensions, kDivergenceSamples * kStates, rng);
+  const Matrix output = 0.5 * Normal(2 * kDimensions, kStates, rng);
+  PolicyLossOptions options{.divergence = GetParam(), .epsilon = 0.02, .mmd_sigma = 1.5};
+  BearObjective<double> objective;
+  const auto loss = [&](const Matrix& at, Matrix* gradient) {
+    GaussianHead<double> pi;
+    pi.Split(at, kPolicyLogStd);
+    return objective.Compute(options, {{pi, observations, actions}, noise, behavior}, kAlpha, &critics,
+                             gradient);
+  };
+  for (const bool use_q : {true, false}) {
+    options.use_q = use_q;
+    Matrix gradient, unused;
+    const ConstrainedLoss<double> at = loss(output, &gradient);
+    EXPECT_EQ(at.threshold, 0.02);
+    EXPECT_NEAR(at.loss, (use_q ? -at.value : 0) + kAlpha * (at.divergence - 0.02), 1e-12);
+    ExpectIsGradient(
+        gradient, [&](const Matrix& moved) { return loss(moved, &unused).loss; }, output);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kernels, BearObjectiveTest,
+                         testing::Values(DbrConfig::MMD_LAPLACIAN, DbrConfig::MMD_GAUSSIAN));
 
 struct Case {
   DbrConfig::Constraint constraint;

@@ -120,6 +120,19 @@ TEST_P(PolicyLossTest, NormalizingDividesTheQTermAlone) {
   ExpectNear(normalized * scale, plain, 1e-9);
 }
 
+TEST_P(PolicyLossTest, WithAFixedThresholdBearsLossIsDbrs) {
+  options_.constraint = DbrConfig::FIXED;
+  const Matrix logits = Uniform(kActions, kStates, rng_);
+  Matrix of_dbr, of_bear;
+  const PolicyLoss<double> dbr = Loss(logits, &of_dbr);
+  PolicyLossWorkspace<double> workspace;
+  const ConstrainedLoss<double> bear = ConstrainedPolicyLoss<double>(
+      options_, {Softmax(logits, masks_), q1_, q2_}, {plus_, options_.epsilon, kAlpha}, &workspace, &of_bear);
+  EXPECT_EQ(bear.loss, dbr.loss);
+  EXPECT_EQ(bear.divergence, dbr.divergence_plus);
+  EXPECT_EQ(of_bear, of_dbr);
+}
+
 INSTANTIATE_TEST_SUITE_P(Options, PolicyLossTest,
                          testing::Values(Case{DbrConfig::DYNAMIC_MAX, DbrConfig::KL, false, 0.0, 0.05},
                                          Case{DbrConfig::DYNAMIC_MAX, DbrConfig::KL, true, 0.1, 0.05},

@@ -1,0 +1,77 @@
+// Bootstrapping Error Accumulation Reduction over continuous actions (Kumar et al. 2019, "Stabilizing
+// Off-Policy Q-Learning via Bootstrapping Error Reduction").
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/rng.h"
+#include "learner/algorithm.h"
+#include "learner/parts/bear_networks.h"
+#include "learner/parts/bear_objective.h"
+#include "learner/parts/behavior_vae.h"
+#include "learner/parts/critic_regression.h"
+#include "learner/parts/greatest_target.h"
+
+namespace dbr {
+
+// State: policy pi (tanh-Gaussian) with target pi', twin critics with targets, a conditional VAE as the
+// behaviour model, and a multiplier alpha. One update on a batch B drawn uniformly from D:
+//   1. The VAE takes a step on its loss over B (nn/cvae.h).
+//   2. y = r + discount * V'(s'), V' the greatest over target_samples draws from pi' of
+//      0.75 min_i Q'_i + 0.25 max_i Q'_i; each critic regresses on y (the paper's algorithm 1).
+//   3. pi minimises -E[min_i mean_k Q_i(s, a_k)] + alpha * (MMD(pi, beta) - eps), a_k policy_samples draws of
+//      pi, the MMD between divergence_samples draws a side of the actions before their tanh, at the same
+//      state; beta's are decoded from latents of N(0, 1) clipped to +-vae_latent_limit (equation 1 and the
+//      paper's section 5). In the first warm_start_updates the Q term is left out.
+//   4. alpha ascends on alpha * (MMD(pi, beta) - eps).
+//   5. Polyak averaging of the critics and of pi.
+//   6. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin before its step, V its mean over the
+//      draws of step 3.
+// Departures from the official code: two critics with the smaller one in step 3, where the paper has an
+// ensemble; the Q term draws from pi anew, where the code takes one of the MMD's draws; the limits of pi's
+// log-std are the house's; step 6.
+template <class Scalar>
+class ContinuousBear {
+ public:
+  explicit ContinuousBear(const AlgorithmSpec& spec);
+
+  // `plus` and `minus` are not used.
+  absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
+                      const BasicBatch<Scalar>& minus);
+
+  BatchNeeds needs() const { return {.uniform = static_cast<int>(spec_.config.batch_size())}; }
+  const std::vector<float>& advantages() const { return advantages_; }
+  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
+  double UpdateFlops() const;
+  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(spec_, snapshot); }
+  void Save(TensorFile* file) const;
+  absl::Status Load(const TensorFile& file);
+
+ private:
+  Scalar FitBehavior(const BasicBatch<Scalar>& batch);
+  Scalar FitCritics(const BasicBatch<Scalar>& batch);
+  ConstrainedLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
+  void ComputeAdvantages(Eigen::Index n);
+
+  AlgorithmSpec spec_;
+  PolicyLossOptions options_;
+  Rng rng_;
+  BearNetworks<Scalar> networks_;
+  BehaviorVae<Scalar> vae_;
+
+  CriticRegression<Scalar> regression_;
+  GreatestTarget<Scalar> next_;
+  GaussianHead<Scalar> pi_;
+  BearObjective<Scalar> objective_;
+  MatrixX<Scalar> vae_noise_, next_noise_, action_noise_, divergence_noise_, latent_noise_, d_output_;
+  VectorX<Scalar> value_;
+  std::vector<float> advantages_;
+  std::vector<UpdateMetric> metrics_;
+};
+
+// InvalidArgument where the divergence is none that samples give: a VAE has no density.
+absl::Status CheckContinuousBear(const AlgorithmSpec& spec);
+std::unique_ptr<Algorithm> MakeContinuousBear(const AlgorithmSpec& spec);
+
+}  // namespace dbr

@@ -1,0 +1,69 @@
+// Bootstrapping Error Accumulation Reduction (Kumar et al. 2019) over discrete actions, on the form of
+// discrete SAC (Christodoulou 2019).
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "core/rng.h"
+#include "learner/algorithm.h"
+#include "learner/parts/bear_networks.h"
+#include "learner/parts/categorical_likelihood.h"
+#include "learner/parts/discrete_losses.h"
+
+namespace dbr {
+
+// State: policy pi (a softmax over the legal actions) with target pi', twin critics with targets, a behaviour
+// policy beta of pi's shape, and a multiplier alpha. One update on a batch B drawn uniformly from D:
+//   1. beta maximises the mean of log beta(a|s) over B.
+//   2. y = r + discount * V'(s'), V' the expectation under pi' of 0.75 min_i Q'_i + 0.25 max_i Q'_i; each
+//      critic regresses on y.
+//   3. pi minimises -E[min_i E_pi Q_i] - entropy_weight * H(pi) + alpha * (D(pi, beta) - eps), D exact. In
+//   the
+//      first warm_start_updates the Q term is left out.
+//   4. alpha ascends on alpha * (D(pi, beta) - eps).
+//   5. Polyak averaging of the critics and of pi.
+//   6. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin, V its expectation under pi.
+// Departures: BEAR is for continuous actions; here expectations are exact where it samples, and beta is a
+// softmax in place of the VAE. Steps 3 and 6 use beta's, the critics' and the policy's values from before
+// their steps of this update, so that nothing is computed twice.
+template <class Scalar>
+class DiscreteBear {
+ public:
+  explicit DiscreteBear(const AlgorithmSpec& spec);
+
+  // `plus` and `minus` are not used.
+  absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
+                      const BasicBatch<Scalar>& minus);
+
+  BatchNeeds needs() const { return {.uniform = static_cast<int>(spec_.config.batch_size())}; }
+  const std::vector<float>& advantages() const { return advantages_; }
+  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
+  double UpdateFlops() const;
+  void ExportPolicy(PolicySnapshot* snapshot) const;
+  void Save(TensorFile* file) const;
+  absl::Status Load(const TensorFile& file);
+
+ private:
+  Scalar FitCritics(const BasicBatch<Scalar>& batch);
+  ConstrainedLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
+
+  AlgorithmSpec spec_;
+  PolicyLossOptions options_;
+  Rng init_rng_;
+  MlpShape shape_;
+  BearNetworks<Scalar> networks_;
+  TrainedNetwork<Scalar> behavior_;
+
+  CategoricalLikelihood<Scalar> beta_;
+  Categorical<Scalar> pi_, next_pi_;
+  PolicyLossWorkspace<Scalar> workspace_;
+  VectorX<Scalar> target_, value_;
+  MatrixX<Scalar> d_logits_;
+  std::vector<float> advantages_;
+  std::vector<UpdateMetric> metrics_;
+};
+
+std::unique_ptr<Algorithm> MakeDiscreteBear(const AlgorithmSpec& spec);
+
+}  // namespace dbr
