@@ -199,6 +199,34 @@ void GaussianKl(const GaussianView<Scalar>& p, const GaussianView<Scalar>& q, Ve
   }
 }
 
+template <class Scalar>
+void SampledKl(const GaussianView<Scalar>& p, const GaussianView<Scalar>& q,
+               const ConstMatrixRef<Scalar>& noise, VectorX<Scalar>* kl, GaussianGradient<Scalar>* d_p) {
+  CheckSameShape(p, q);
+  const Eigen::Index dimensions = p.mean.rows(), n = p.mean.cols();
+  DBR_CHECK(noise.rows() == dimensions && noise.cols() > 0 && noise.cols() % n == 0);
+  const auto draws = static_cast<Scalar>(noise.cols() / n);
+  kl->setZero(n);
+  if (d_p != nullptr) d_p->Resize(dimensions, n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index d = 0; d < dimensions; ++d) {
+      const Scalar deviation = std::exp(p.log_std(d, j)), precision = std::exp(-q.log_std(d, j));
+      Scalar sum = 0, d_mean = 0, d_deviation = 0;
+      for (Eigen::Index k = j; k < noise.cols(); k += n) {
+        const Scalar e = noise(d, k);
+        const Scalar z = (p.mean(d, j) + deviation * e - q.mean(d, j)) * precision;  // deviations of q
+        sum += (z * z - e * e) / 2;
+        d_mean += z * precision;
+        d_deviation += z * precision * e;
+      }
+      (*kl)[j] += sum / draws + q.log_std(d, j) - p.log_std(d, j);
+      if (d_p == nullptr) continue;
+      d_p->mean(d, j) = d_mean / draws;
+      d_p->log_std(d, j) = d_deviation * deviation / draws - 1;
+    }
+  }
+}
+
 #define DBR_INSTANTIATE(Scalar)                                                                              \
   template void SampledMmd<Scalar>(const SampleSets<Scalar>&, const Kernel&, VectorX<Scalar>*,               \
                                    MatrixX<Scalar>*);                                                        \
@@ -207,7 +235,10 @@ void GaussianKl(const GaussianView<Scalar>& p, const GaussianView<Scalar>& q, Ve
   template void CategoricalMmd<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&, double, \
                                        VectorX<Scalar>*, MatrixX<Scalar>*);                                  \
   template void GaussianKl<Scalar>(const GaussianView<Scalar>&, const GaussianView<Scalar>&,                 \
-                                   VectorX<Scalar>*, GaussianGradient<Scalar>*, GaussianGradient<Scalar>*);
+                                   VectorX<Scalar>*, GaussianGradient<Scalar>*, GaussianGradient<Scalar>*);  \
+  template void SampledKl<Scalar>(const GaussianView<Scalar>&, const GaussianView<Scalar>&,                  \
+                                  const ConstMatrixRef<Scalar>&, VectorX<Scalar>*,                           \
+                                  GaussianGradient<Scalar>*);
 DBR_INSTANTIATE(float)
 DBR_INSTANTIATE(double)
 #undef DBR_INSTANTIATE

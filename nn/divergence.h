@@ -54,4 +54,12 @@ template <class Scalar>
 void GaussianKl(const GaussianView<Scalar>& p, const GaussianView<Scalar>& q, VectorX<Scalar>* kl,
                 GaussianGradient<Scalar>* d_p, GaussianGradient<Scalar>* d_q);
 
+// KL(p || q) estimated from draws of p: the mean over the draws u_k = p.mean + exp(p.log_std) * noise_k of
+// log p(u_k) - log q(u_k), in nats. noise [dimensions x draws * n], draw k of state j in column k * n + j.
+// The same for tanh(u_k): the tanh's change of variables stands in both densities. The gradient is pathwise,
+// through the draws; q is a constant.
+template <class Scalar>
+void SampledKl(const GaussianView<Scalar>& p, const GaussianView<Scalar>& q,
+               const ConstMatrixRef<Scalar>& noise, VectorX<Scalar>* kl, GaussianGradient<Scalar>* d_p);
+
 }  // namespace dbr

@@ -248,6 +248,57 @@ TEST(TanhGaussianTest, SamplesMatchReferenceValuesAndGradients) {
   });
 }
 
+TEST(SampledKlTest, GradientMatchesCentralDifferences) {
+  Rng rng(21);
+  constexpr int kDraws = 4;
+  const Gaussian p = RandomGaussian(3, 5, rng), q = RandomGaussian(3, 5, rng);
+  const Matrix noise = Normals(3, kDraws * 5, rng);
+  const Vector weights = Normals(5, 1, rng);
+  const auto weighted = [&](const Gaussian& at, GaussianGradient<double>* gradient) {
+    Vector kl;
+    SampledKl<double>(at.view(), q.view(), noise, &kl, gradient);
+    return kl.dot(weights);
+  };
+  GaussianGradient<double> gradient;
+  weighted(p, &gradient);
+  gradient.mean.array().rowwise() *= weights.transpose().array();
+  gradient.log_std.array().rowwise() *= weights.transpose().array();
+  ExpectIsGradient(
+      gradient.mean,
+      [&](const Matrix& at) {
+        return weighted({at, p.log_std}, nullptr);
+      },
+      p.mean);
+  ExpectIsGradient(
+      gradient.log_std,
+      [&](const Matrix& at) {
+        return weighted({p.mean, at}, nullptr);
+      },
+      p.log_std);
+}
+
+TEST(SampledKlTest, IsTheDifferenceOfTheLogProbabilitiesOfTheDraws) {
+  Rng rng(22);
+  const Gaussian p = RandomGaussian(2, 3, rng), q = RandomGaussian(2, 3, rng);
+  const Matrix noise = 0.5 * Normals(2, 3, rng);
+  TanhSample<double> sample;
+  SampleTanhGaussian<double>(p.view(), noise, &sample);
+  Vector kl, under_q;
+  TanhLogProb<double>(q.view(), sample.action, &under_q, nullptr);
+  SampledKl<double>(p.view(), q.view(), noise, &kl, nullptr);
+  ExpectNear(kl, sample.log_prob - under_q, 1e-8);
+}
+
+TEST(SampledKlTest, TheMeanOfManyDrawsIsTheExactKl) {
+  Rng rng(23);
+  constexpr int kDraws = 40000;
+  const Gaussian p = RandomGaussian(2, 1, rng), q = RandomGaussian(2, 1, rng);
+  Vector kl;
+  SampledKl<double>(p.view(), q.view(), Normals(2, kDraws, rng), &kl, nullptr);
+  const double exact = KlSum(p, q);
+  EXPECT_NEAR(kl[0], exact, 0.03 * (1 + exact));
+}
+
 TEST(TanhGaussianTest, LogProbOfDataMatchesReferenceValuesAndGradients) {
   ForEachCase("tanh_gaussian", [](const Json& c) {
     const Gaussian g{ToMatrix(c["mean"]), ToMatrix(c["log_std"])};
