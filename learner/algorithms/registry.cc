@@ -2,6 +2,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "learner/algorithm.h"
+#include "learner/algorithms/awac.h"
+#include "learner/algorithms/brac.h"
 #include "learner/algorithms/continuous_bear.h"
 #include "learner/algorithms/continuous_dbr.h"
 #include "learner/algorithms/ddqn.h"
@@ -10,6 +12,7 @@
 #include "learner/algorithms/normalized.h"
 #include "learner/algorithms/sac.h"
 #include "learner/algorithms/sac_discrete.h"
+#include "learner/algorithms/td3.h"
 
 namespace dbr {
 namespace {
@@ -40,6 +43,10 @@ constexpr Entry kAlgorithms[] = {
     {"ddqn", AlgorithmConfig::kDdqn, ActionKind::kDiscrete, MakeDdqn, "van Hasselt et al. 2016", ""},
     {"sac_discrete", AlgorithmConfig::kSacDiscrete, ActionKind::kDiscrete, MakeSacDiscrete,
      "Christodoulou 2019", ""},
+    {"brac", AlgorithmConfig::kBrac, ActionKind::kContinuous, MakeBrac, "Wu, Tucker, Nachum 2019",
+     "variant, adaptive_multiplier"},
+    {"td3", AlgorithmConfig::kTd3, ActionKind::kContinuous, MakeTd3, "Fujimoto, van Hoof, Meger 2018", ""},
+    {"awac", AlgorithmConfig::kAwac, ActionKind::kContinuous, MakeAwac, "Nair et al. 2020", ""},
 };
 
 const char* NameOf(ActionKind kind) {

@@ -18,7 +18,17 @@ class GaussianLikelihood {
   // loss, and does nothing on an empty batch.
   void Fit(const BasicBatch<Scalar>& batch, const VectorX<Scalar>* weights, TrainedNetwork<Scalar>* network) {
     if (batch.size() == 0) return;
-    head_.Split(network->Forward(batch.observations), limits_);
+    Forward(batch.observations, network);
+    Step(batch, weights, network);
+  }
+
+  // The two halves of Fit, for weights that depend on the policy: its evaluation, and the step from it.
+  const GaussianHead<Scalar>& Forward(const MatrixX<Scalar>& observations, TrainedNetwork<Scalar>* network) {
+    head_.Split(network->Forward(observations), limits_);
+    return head_;
+  }
+  void Step(const BasicBatch<Scalar>& batch, const VectorX<Scalar>* weights,
+            TrainedNetwork<Scalar>* network) {
     loss_ = Loss(batch.actions, weights, &d_output_);
     network->Step(batch.observations, d_output_);
   }

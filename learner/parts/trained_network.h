@@ -64,6 +64,10 @@ class TrainedNetwork {
   // One Adam step on gradient().
   void ApplyGradient() { adam_.Step(gradient_, &parameters_); }
   void set_learning_rate(double learning_rate) { adam_.set_learning_rate(learning_rate); }
+  // Lets the target, where there is one, start again from the online network.
+  void ResetTarget() {
+    if (target_.size() > 0) target_ = parameters_;
+  }
   void UpdateTarget(double tau) { PolyakUpdate(parameters_, static_cast<Scalar>(tau), &target_); }
 
   void Save(const std::string& name, TensorFile* file) const {

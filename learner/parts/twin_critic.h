@@ -60,6 +60,11 @@ class TwinCritic {
     first_.d_x += second_.d_x;
     return first_.d_x;
   }
+  // The gradient of sum(d_q1 .* q1) alone.
+  const MatrixX<Scalar>& FirstInputGradient(const ConstMatrixRef<Scalar>& d_q1) {
+    first_.network.InputGradient(d_q1, &first_.d_x);
+    return first_.d_x;
+  }
 
   void set_learning_rate(double learning_rate) {
     first_.network.set_learning_rate(learning_rate);
@@ -82,11 +87,12 @@ class TwinCritic {
   }
 
   // Useful operations for n samples.
-  double TargetFlops(Eigen::Index n) const { return 2 * shape().ForwardFlops(n); }
+  double TargetFlops(Eigen::Index n) const { return 2 * shape().ForwardFlops(n); }  // or of Evaluate
   double FitFlops(Eigen::Index n) const {
     return 2 * (shape().ForwardFlops(n) + shape().ParameterGradientFlops(n));
   }
-  double InputGradientFlops(Eigen::Index n) const { return 4 * shape().ForwardFlops(n); }  // with Evaluate
+  double InputGradientFlops(Eigen::Index n) const { return 4 * shape().ForwardFlops(n); }   // with Evaluate
+  double FirstInputGradientFlops(Eigen::Index n) const { return shape().ForwardFlops(n); }  // without it
 
  private:
   struct Critic {

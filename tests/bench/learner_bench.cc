@@ -67,11 +67,30 @@ AlgorithmSpec Sac(AlgorithmSpec spec) {
 
 AlgorithmSpec Ddqn(AlgorithmSpec spec) {
   spec.config.mutable_ddqn();
+  spec.config.set_threads(1);
   return spec;
 }
 
 AlgorithmSpec SacDiscrete(AlgorithmSpec spec) {
   spec.config.mutable_sac_discrete();
+  spec.config.set_threads(1);
+  return spec;
+}
+
+AlgorithmSpec Brac(AlgorithmSpec spec) {
+  spec.config.mutable_brac();
+  spec.config.set_threads(1);
+  return spec;
+}
+
+AlgorithmSpec Td3(AlgorithmSpec spec) {
+  spec.config.mutable_td3();
+  spec.config.set_threads(1);
+  return spec;
+}
+
+AlgorithmSpec Awac(AlgorithmSpec spec) {
+  spec.config.mutable_awac();
   spec.config.set_threads(1);
   return spec;
 }
@@ -117,6 +136,9 @@ DBR_UPDATE("dbr/hopper", Dbr(Hopper()));
 DBR_UPDATE("dbr/ant", Dbr(Ant()));
 DBR_UPDATE("bear/connect4", Bear(Connect4()));
 DBR_UPDATE("bear/ant", Bear(Ant()));
+DBR_UPDATE("brac/ant", Brac(Ant()));
+DBR_UPDATE("td3/ant", Td3(Ant()));
+DBR_UPDATE("awac/ant", Awac(Ant()));
 // In wall-clock time; beside them the same on one thread.
 DBR_UPDATE("sac/ant/one_thread", Sac(Ant()))->UseRealTime();
 DBR_UPDATE("dbr/ant/one_thread", Dbr(Ant()))->UseRealTime();

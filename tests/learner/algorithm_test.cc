@@ -28,6 +28,9 @@ AlgorithmSpec SpecOf(const AlgorithmId& id, std::uint64_t seed = 1) {
     bear->set_warm_start_updates(2);
     bear->add_vae_hidden_sizes(8);
   }
+  if (id.name == "brac") spec.config.mutable_brac()->set_variant(BracConfig::VP);
+  if (id.name == "td3") spec.config.mutable_td3();
+  if (id.name == "awac") spec.config.mutable_awac()->set_value_samples(3);
   EXPECT_EQ(AlgorithmName(spec.config), id.name) << "give the new algorithm its config here";
   return spec;
 }

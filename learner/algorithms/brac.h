@@ -1,0 +1,71 @@
+// Behavior Regularized Actor Critic over continuous actions (Wu, Tucker, Nachum 2019, "Behavior Regularized
+// Offline Reinforcement Learning").
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "learner/algorithm.h"
+#include "learner/parts/actor_critic_networks.h"
+#include "learner/parts/behavior_kl_objective.h"
+#include "learner/parts/critic_regression.h"
+#include "learner/parts/gaussian_likelihood.h"
+#include "learner/parts/multiplier.h"
+
+namespace dbr {
+
+// State: policy pi with target pi', twin critics with targets, a behaviour policy beta (tanh-Gaussian) and a
+// multiplier alpha. One update on a batch B drawn uniformly from D:
+//   1. beta maximises the mean of log beta(a|s) over B.
+//   2. y = r + discount * V'(s'), V' = w min_i Q'_i + (1 - w) max_i Q'_i at one draw a' of pi'
+//      (their weighted mixture of an ensemble, w = target_min_weight); variant VP (their value penalty):
+//      less alpha * (log pi'(a'|s') - log beta(a'|s')). Each critic regresses on y.
+//   3. pi minimises -E[min_i mean_k Q_i(s, a_k)] + alpha * KL(pi || beta), estimated from the same
+//      divergence_samples draws a_k (their policy regularisation, parts/behavior_kl_objective.h).
+//   4. adaptive_multiplier: alpha ascends on alpha * (KL - epsilon); else it stays.
+//   5. Polyak averaging of the critics and of pi.
+//   6. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin before its step, V its mean over the
+//      draws of step 3.
+// Departures: beta is fitted along with the rest instead of beforehand (warm_start_updates, which leaves the
+// Q term out at first, gives it time); step 3 takes beta from before step 1's gradient step, so that nothing
+// is computed twice; the target's draw is of pi', not of pi.
+template <class Scalar>
+class Brac {
+ public:
+  explicit Brac(const AlgorithmSpec& spec);
+
+  // `plus` and `minus` are not used.
+  absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
+                      const BasicBatch<Scalar>& minus);
+
+  BatchNeeds needs() const { return networks_.needs(); }
+  const std::vector<float>& advantages() const { return networks_.advantages; }
+  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
+  double UpdateFlops() const;
+  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
+  void Save(TensorFile* file) const;
+  absl::Status Load(const TensorFile& file);
+
+ private:
+  const BracConfig& config() const { return networks_.spec.config.brac(); }
+  // V'(s') [n] into next_value_.
+  void ComputeNextValue(const BasicBatch<Scalar>& batch);
+  BehaviorKlLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
+
+  ActorCriticNetworks<Scalar> networks_;
+  TrainedNetwork<Scalar> behavior_;
+  Multiplier<Scalar> multiplier_;
+
+  GaussianLikelihood<Scalar> beta_{kBehaviorLogStd};
+  CriticRegression<Scalar> regression_;
+  GaussianHead<Scalar> pi_, next_pi_, next_beta_;
+  SampledActions<Scalar> next_draws_;
+  BehaviorKlObjective<Scalar> objective_;
+  MatrixX<Scalar> noise_, next_noise_, d_output_;
+  VectorX<Scalar> next_value_, next_kl_, value_;
+  std::vector<UpdateMetric> metrics_;
+};
+
+std::unique_ptr<Algorithm> MakeBrac(const AlgorithmSpec& spec);
+
+}  // namespace dbr

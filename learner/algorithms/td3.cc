@@ -1,0 +1,84 @@
+#include "learner/algorithms/td3.h"
+
+#include "learner/algorithms/algorithm_adapter.h"
+#include "learner/parts/update_metrics.h"
+
+namespace dbr {
+
+template <class Scalar>
+Td3<Scalar>::Td3(const AlgorithmSpec& spec)
+    : networks_(spec, /*policy_target=*/true), metrics_{{"train/critic_loss"},
+                                                        {"train/actor_loss"},
+                                                        {"train/value_mean"},
+                                                        {"train/target_mean"},
+                                                        {"train/advantage_mean"},
+                                                        {"train/advantage_positive"},
+                                                        {"train/advantage_std"}} {
+  PinLogStd(networks_.policy.shape(), &networks_.policy.parameters());
+  networks_.policy.ResetTarget();
+}
+
+template <class Scalar>
+absl::Status Td3<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
+                                 const BasicBatch<Scalar>&) {
+  networks_.Begin();
+  const Scalar critic_loss = FitCritics(uniform);
+  const Scalar policy_loss = ImprovePolicy(uniform);
+  ++networks_.updates;
+  const AdvantageFigures advantages = FiguresOf(networks_.advantages);
+  return SetMetrics({critic_loss, policy_loss, value_.mean(), regression_.target().mean(), advantages.mean,
+                     advantages.positive, advantages.deviation},
+                    networks_.updates, &metrics_);
+}
+
+template <class Scalar>
+Scalar Td3<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
+  const Eigen::Index n = batch.size();
+  TwinCritic<Scalar>& critics = networks_.critics;
+  next_pi_.Split(networks_.policy.ForwardTarget(batch.next_observations), kPolicyLogStd);
+  FillNormal(networks_.rng, networks_.spec.actions.size, n, &noise_);
+  SmoothedActions<Scalar>(next_pi_.mean(), noise_, {config().target_noise(), config().target_noise_limit()},
+                          &next_actions_);
+  next_inputs_.resize(batch.observations.rows() + next_actions_.rows(), n);
+  next_inputs_ << batch.next_observations, next_actions_;
+  critics.EvaluateTargets(next_inputs_);
+  next_value_.resize(n);
+  MeanOfSmaller<Scalar>(critics.target1(), critics.target2(), &next_value_);
+  return regression_.Fit(batch, networks_.spec.config.reward_scale(), next_value_, &critics);
+}
+
+template <class Scalar>
+Scalar Td3<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
+  TwinCritic<Scalar>& critics = networks_.critics;
+  pi_.Split(networks_.policy.Forward(batch.observations), kPolicyLogStd);
+  const Scalar loss = objective_.Evaluate(pi_, batch.observations, &critics);
+  value_.resize(batch.size());
+  MeanOfSmaller<Scalar>(critics.value1(), critics.value2(), &value_);
+  networks_.SetAdvantages(regression_.behavior_value(), value_);
+  if (networks_.updates % config().policy_delay() != 0) return loss;
+  objective_.Gradient(pi_, &critics, &d_output_);
+  networks_.policy.Step(batch.observations, d_output_);
+  critics.UpdateTargets(networks_.spec.config.target_tau());
+  networks_.policy.UpdateTarget(networks_.spec.config.target_tau());
+  return loss;
+}
+
+template <class Scalar>
+double Td3<Scalar>::UpdateFlops() const {
+  const Eigen::Index n = needs().uniform;
+  const TwinCritic<Scalar>& critics = networks_.critics;
+  const MlpShape& policy = networks_.policy.shape();
+  const double delayed = critics.FirstInputGradientFlops(n) + policy.ParameterGradientFlops(n);
+  // The critics' targets at s', the critics at pi(s); pi' at s', pi at s.
+  return critics.FitFlops(n) + 2 * critics.TargetFlops(n) + 2 * policy.ForwardFlops(n) +
+         delayed / config().policy_delay();
+}
+
+template class Td3<float>;
+template class Td3<double>;
+
+std::unique_ptr<Algorithm> MakeTd3(const AlgorithmSpec& spec) {
+  return std::make_unique<AlgorithmAdapter<Td3>>(spec);
+}
+
+}  // namespace dbr

@@ -1,0 +1,61 @@
+// Twin Delayed Deep Deterministic policy gradient over continuous actions (Fujimoto, van Hoof, Meger 2018,
+// "Addressing Function Approximation Error in Actor-Critic Methods").
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "learner/algorithm.h"
+#include "learner/parts/actor_critic_networks.h"
+#include "learner/parts/critic_regression.h"
+#include "learner/parts/deterministic_policy.h"
+#include "nn/gaussian_head.h"
+
+namespace dbr {
+
+// State: a deterministic policy pi(s) = tanh(mean(s)) with target pi', twin critics with targets. The policy
+// is the Gaussian network that actors and files know, its log-stds pinned to the lower limit: sampling it
+// gives its mode but for e^-20. One update (algorithm 1) on a batch B drawn uniformly from D:
+//   1. y = r + discount * min_i Q'_i(s', clip(pi'(s') + noise, +-1)), the noise normal with deviation
+//      target_noise, clipped to +-target_noise_limit; each critic regresses on y.
+//   2. Every policy_delay updates: pi minimises -E[Q_1(s, pi(s))]; Polyak averaging of the critics and of pi.
+//   3. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin before its step, V at pi(s) before
+//      step 2's.
+// Departures: of policy_delay updates the first, not the last, moves the policy; the noise of exploration is
+// the actors' (actor.mode MODE with actor.action_noise).
+template <class Scalar>
+class Td3 {
+ public:
+  explicit Td3(const AlgorithmSpec& spec);
+
+  // `plus` and `minus` are not used.
+  absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
+                      const BasicBatch<Scalar>& minus);
+
+  BatchNeeds needs() const { return networks_.needs(); }
+  const std::vector<float>& advantages() const { return networks_.advantages; }
+  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
+  double UpdateFlops() const;  // the mean over policy_delay updates
+  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
+  void Save(TensorFile* file) const { networks_.Save(file); }
+  absl::Status Load(const TensorFile& file) { return networks_.Load(file); }
+
+ private:
+  const Td3Config& config() const { return networks_.spec.config.td3(); }
+  Scalar FitCritics(const BasicBatch<Scalar>& batch);
+  // Steps 2 and 3; the policy's loss, also where it does not move.
+  Scalar ImprovePolicy(const BasicBatch<Scalar>& batch);
+
+  ActorCriticNetworks<Scalar> networks_;
+
+  GaussianHead<Scalar> pi_, next_pi_;
+  DeterministicPolicyObjective<Scalar> objective_;
+  CriticRegression<Scalar> regression_;
+  MatrixX<Scalar> noise_, next_actions_, next_inputs_, d_output_;
+  VectorX<Scalar> next_value_, value_;
+  std::vector<UpdateMetric> metrics_;
+};
+
+std::unique_ptr<Algorithm> MakeTd3(const AlgorithmSpec& spec);
+
+}  // namespace dbr
