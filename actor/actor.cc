@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "core/status_macros.h"
 #include "proto/channel.h"
 #include "proto/grpc_status.h"
+#include "replay/client.h"
 
 namespace dbr {
 namespace {
@@ -22,6 +24,7 @@ constexpr std::uint64_t kEvaluatorStream = 1 << 19;  // of the config's seed
 constexpr std::size_t kBufferedSteps = 16;           // of each environment, where the config leaves it open
 constexpr absl::Duration kStopCheck = absl::Milliseconds(100);
 constexpr absl::Duration kReportTimeout = absl::Seconds(5);
+constexpr absl::Duration kStatsTimeout = absl::Seconds(2);
 
 Rng ActorRng(const ActorOptions& options) {
   return Rng(options.config.seed()).Fork(kActorStream + options.index);
@@ -53,15 +56,17 @@ WriterOptions Writing(const ActorOptions& options, const EnvSpec& env) {
   return writing;
 }
 
-EvaluationLoopOptions Evaluating(const Config& config, const std::string& env) {
-  const EvaluationConfig& evaluation = config.evaluation();
+EvaluationLoopOptions Evaluating(const ActorOptions& options, const std::string& env) {
+  const EvaluationConfig& evaluation = options.config.evaluation();
   return {
       .opponents = OpponentsToEvaluate(env, {evaluation.opponents().begin(), evaluation.opponents().end()}),
       .episodes = static_cast<int>(evaluation.episodes()),
-      .seed = Rng(config.seed()).Fork(kEvaluatorStream)() >> 32,
+      .seed = Rng(options.config.seed()).Fork(kEvaluatorStream)() >> 32,
       .mode = evaluation.mode(),
       .threads = 1,
-      .every = absl::Seconds(evaluation.every_s())};
+      .every = absl::Seconds(evaluation.every_s()),
+      .every_updates = evaluation.every_updates(),
+      .resumed = options.resumed};
 }
 
 // Tells of episodes whose world failed: of the first, and each time their number has doubled.
@@ -84,6 +89,7 @@ absl::StatusOr<std::unique_ptr<Actor>> Actor::Create(const ActorOptions& options
   ASSIGN_OR_RETURN(
       std::unique_ptr<VectorEnv> envs,
       VectorEnv::Create(TrainingEnv(options.config), static_cast<int>(options.config.actor().envs())));
+  RETURN_IF_ERROR(CheckExploration(envs->spec(), options.config.actor()));
   return std::unique_ptr<Actor>(new Actor(options, std::move(envs)));
 }
 
@@ -110,10 +116,8 @@ absl::Status Actor::Act() {
                    subscriber_->WaitForFirst(absl::InfiniteDuration()));
   spdlog::info("acting in {} environments, from policy version {}", envs_->size(), first->snapshot().version);
   const ActorConfig& actor = options_.config.actor();
-  const StepLoopOptions stepping = {.mode = actor.mode(),
-                                    .epsilon = actor.epsilon(),
-                                    .epsilon_ladder = actor.epsilon_ladder(),
-                                    .discount = options_.config.algorithm().discount()};
+  const StepLoopOptions stepping = {
+      .mode = actor.mode(), .exploration = Exploring(), .discount = options_.config.algorithm().discount()};
   // An actor that starts again in the middle of a run must not play its first games once more.
   const Rng rng = ActorRng(options_).Fork(first->snapshot().version);
   StepLoop loop(std::move(envs_), stepping, rng,
@@ -128,6 +132,24 @@ absl::Status Actor::Act() {
     worlds.Tell(loop.counters());
   }
   return absl::OkStatus();
+}
+
+// Where epsilon decays, the replay server knows how far the run has come: an actor that starts again, or in a
+// run that is resumed, goes on from there.
+ExplorationOptions Actor::Exploring() const {
+  const ActorConfig& actor = options_.config.actor();
+  ExplorationOptions exploring = ExplorationOptions::Of(actor);
+  const int processes = options_.processes > 0 ? options_.processes : static_cast<int>(actor.processes());
+  exploring.processes = std::max(1, processes);
+  if (exploring.epsilon_decay_steps == 0) return exploring;
+  const absl::StatusOr<StatsReply> stats = ReplayClient(options_.replay_address).Stats(kStatsTimeout);
+  if (stats.ok()) {
+    exploring.first_step = stats->inserted();
+  } else {
+    spdlog::warn("the replay server does not say how many steps there were: epsilon starts at {}. {}",
+                 exploring.epsilon, std::string(stats.status().message()));
+  }
+  return exploring;
 }
 
 absl::Status Actor::Write(const TransitionView& transition, float advantage, std::uint64_t critic_version,
@@ -166,10 +188,13 @@ EvaluatorProcess::EvaluatorProcess(const ActorOptions& options, const EnvSpec& e
       stub_(Policy::NewStub(MakeChannel(options.learner_address))),
       subscriber_(
           Subscription(options, env, "evaluator", Rng(options.config.seed()).Fork(kEvaluatorStream)())),
-      loop_(Evaluating(options.config, env.name),
-            {.newest_policy = [this] { return subscriber_.Current(); },
-             .report = [this](const EvaluationReport& report) { return Report(report); },
-             .keep_best = [this](const PolicySnapshot& snapshot) { KeepBest(snapshot); }}) {}
+      loop_(
+          Evaluating(options, env.name),
+          {.newest_policy = [this] { return subscriber_.Current(); },
+           .report = [this](const EvaluationReport& report) { return Report(report); },
+           .next_policy = [this](const PolicySubscriber::PolicyPtr& last,
+                                 absl::Duration timeout) { return subscriber_.WaitForOther(last, timeout); },
+           .keep_best = [this](const PolicySnapshot& snapshot) { KeepBest(snapshot); }}) {}
 
 absl::Status EvaluatorProcess::Run() {
   return loop_.Run();

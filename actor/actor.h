@@ -20,9 +20,11 @@ namespace dbr {
 
 struct ActorOptions {
   Config config;
-  int index = 0;  // of the actor process
+  int index = 0;      // of the actor process
+  int processes = 0;  // actors of the run; 0: as many as the config says, or one where it leaves that open
   std::string replay_address;
   std::string learner_address;
+  bool resumed = false;          // the evaluator: another one was there before, in this run
   std::string best_policy = {};  // file for the evaluator's best policy; empty: none is kept
   absl::Duration drain_timeout = absl::Seconds(5);  // for what is still unacknowledged at the end
 };
@@ -47,6 +49,7 @@ class Actor {
   Actor(const ActorOptions& options, std::unique_ptr<VectorEnv> envs);
 
   absl::Status Act();
+  ExplorationOptions Exploring() const;
   absl::Status Write(const TransitionView& transition, float advantage, std::uint64_t critic_version,
                      const std::optional<EpisodeEnd>& end);
   void Drain();

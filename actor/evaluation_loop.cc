@@ -12,6 +12,8 @@
 namespace dbr {
 namespace {
 
+using PolicyPtr = std::shared_ptr<const PolicyNetworks>;
+
 EvaluationReport ReportOf(const EvaluationResult& result, const PolicySnapshot& snapshot) {
   EvaluationReport report;
   report.set_policy_version(snapshot.version);
@@ -67,6 +69,10 @@ void EvaluationLoop::Close() {
 }
 
 absl::Status EvaluationLoop::Run() {
+  return options_.every_updates > 0 ? RunByUpdates() : RunByTime();
+}
+
+absl::Status EvaluationLoop::RunByTime() {
   absl::Time next = ports_.now();
   while (!closing_) {
     const absl::Status status = EvaluateIfNew();
@@ -79,11 +85,56 @@ absl::Status EvaluationLoop::Run() {
   return absl::OkStatus();
 }
 
+absl::Status EvaluationLoop::RunByUpdates() {
+  PolicyPtr last;
+  while (!closing_) {
+    absl::StatusOr<PolicyPtr> policy = ports_.next_policy(last, kSendEvery);
+    if (closing_) break;
+    if (policy.ok()) {
+      last = *std::move(policy);
+      const absl::Status status = EvaluateIfDue(*last);
+      if (closing_) break;
+      RETURN_IF_ERROR(status);
+    } else if (!absl::IsDeadlineExceeded(policy.status())) {
+      return policy.status();
+    }
+    SendReports();
+  }
+  return absl::OkStatus();
+}
+
+absl::Status EvaluationLoop::EvaluateIfDue(const PolicyNetworks& policy) {
+  const std::uint64_t iteration = policy.snapshot().updates / options_.every_updates;
+  if (last_iteration_.has_value() && iteration <= *last_iteration_) return absl::OkStatus();
+  return EvaluateAll(policy, Reach(iteration));
+}
+
+// Goes on to a later iteration, and says what is skipped.
+EvaluationLoop::Iterations EvaluationLoop::Reach(std::uint64_t iteration) {
+  Iterations iterations{.current = iteration, .skipped = {}};
+  std::uint64_t first = last_iteration_.has_value() ? *last_iteration_ + 1 : options_.resumed ? iteration : 0;
+  last_iteration_ = iteration;
+  for (; first < iteration; ++first) iterations.skipped.push_back(first);
+  if (iterations.skipped.empty()) return iterations;
+  skipped_ += iterations.skipped.size();
+  spdlog::warn("training is ahead: evaluation iterations {} to {} are skipped, {} so far",
+               iterations.skipped.front(), iterations.skipped.back(), skipped_);
+  return iterations;
+}
+
 absl::Status EvaluationLoop::EvaluateIfNew() {
-  ASSIGN_OR_RETURN(std::shared_ptr<const PolicyNetworks> policy, ports_.newest_policy());
+  ASSIGN_OR_RETURN(PolicyPtr policy, ports_.newest_policy());
   if (policy == nullptr) return absl::OkStatus();
-  const PolicySnapshot& snapshot = policy->snapshot();
-  if (evaluated_ != nullptr && snapshot.version == evaluated_->snapshot().version) return absl::OkStatus();
+  if (evaluated_ != nullptr && policy->snapshot().version == evaluated_->snapshot().version)
+    return absl::OkStatus();
+  RETURN_IF_ERROR(EvaluateAll(*policy, {}));
+  evaluated_ = std::move(policy);
+  return absl::OkStatus();
+}
+
+// Against each opponent in turn.
+absl::Status EvaluationLoop::EvaluateAll(const PolicyNetworks& policy, const Iterations& iterations) {
+  const PolicySnapshot& snapshot = policy.snapshot();
   double sum = 0;
   for (const std::string& opponent : options_.opponents) {
     const EvaluationOptions evaluation = {.opponent = opponent,
@@ -91,17 +142,18 @@ absl::Status EvaluationLoop::EvaluateIfNew() {
                                           .seed = options_.seed + snapshot.version,
                                           .mode = options_.mode,
                                           .threads = options_.threads};
-    ASSIGN_OR_RETURN(const EvaluationResult result, Evaluate(*policy, evaluation, &closing_));
+    ASSIGN_OR_RETURN(const EvaluationResult result, Evaluate(policy, evaluation, &closing_));
     Log(result, snapshot);
     sum += std::isfinite(result.score_mean) ? result.score_mean : result.return_mean;
     unsent_.push_back(ReportOf(result, snapshot));
+    if (iterations.current.has_value()) unsent_.back().set_iteration(*iterations.current);
+    unsent_.back().mutable_skipped_iterations()->Assign(iterations.skipped.begin(), iterations.skipped.end());
     if (unsent_.size() > kMaxUnsent) unsent_.pop_front();
     if (&opponent == &options_.opponents.back()) {
       KeepIfBest(sum / static_cast<double>(options_.opponents.size()), snapshot);
     }
     SendReports();
   }
-  evaluated_ = std::move(policy);
   return absl::OkStatus();
 }
 

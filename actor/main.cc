@@ -21,20 +21,28 @@ struct Flags {
   std::string config;
   std::string run_dir;
   int index = 0;
+  int processes = 0;
   std::string replay;
   std::string learner;
   bool evaluate = false;
+  bool resume = false;
 };
 
 void Declare(CLI::App* app, Flags* flags) {
   app->add_option("--config", flags->config, "Configuration (text format)")->required();
   app->add_option("--run-dir", flags->run_dir, "Folder of the run")->required();
   app->add_option("--index", flags->index, "Number of this actor among its like")->check(CLI::Range(0, 1023));
+  app->add_option("--processes", flags->processes,
+                  "Actors of the run, for what they do together (default: the config's, or 1)")
+      ->check(CLI::Range(0, 1024));
   app->add_option("--replay", flags->replay,
                   "Replay server (default: the config's, else the run folder's socket)");
   app->add_option("--learner", flags->learner,
                   "Learner (default: the config's, else the run folder's socket)");
   app->add_flag("--evaluate", flags->evaluate, "Be the evaluator: play evaluation episodes, insert nothing");
+  app->add_flag(
+      "--resume", flags->resume,
+      "The evaluator: go on for another one in the middle of a run, whose iterations it leaves alone");
   app->footer("Example: dbr-actor --config deploy/configs/connect4.textproto --run-dir runs/first --index 0");
 }
 
@@ -72,8 +80,10 @@ int Main(int argc, char** argv) {
   const ActorOptions options = {
       .config = *config,
       .index = flags.index,
+      .processes = flags.processes,
       .replay_address = ChooseAddress(flags.replay, config->replay().address(), run.replay_address()),
       .learner_address = ChooseAddress(flags.learner, config->learner().address(), run.learner_address()),
+      .resumed = flags.resume,
       .best_policy = run.best_policy()};
   return flags.evaluate ? RunProcess(EvaluatorProcess::Create(options)) : RunProcess(Actor::Create(options));
 }

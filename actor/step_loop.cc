@@ -11,7 +11,7 @@ StepLoop::StepLoop(std::unique_ptr<VectorEnv> envs, const StepLoopOptions& optio
                    TransitionSink sink)
     : envs_(std::move(envs)),
       options_(options),
-      exploration_(envs_->spec().actions, options.epsilon, options.epsilon_ladder, envs_->size()),
+      exploration_(envs_->spec().actions, options.exploration, envs_->size()),
       rng_(rng),
       sink_(std::move(sink)),
       actions_(MatrixX<float>::Zero(envs_->spec().actions.width(), envs_->size())),

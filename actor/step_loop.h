@@ -25,8 +25,7 @@ using TransitionSink =
 
 struct StepLoopOptions {
   ActingMode mode = SAMPLE;
-  double epsilon = 0;  // see Exploration
-  double epsilon_ladder = 0;
+  ExplorationOptions exploration;
   double discount = 0.99;  // of every transition that does not end in a true terminal
 };
 

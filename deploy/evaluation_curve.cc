@@ -9,18 +9,19 @@ std::vector<EvaluationPoint> EvaluationCurve::Update(const RunSample& sample) {
   Remember(sample);
   std::vector<EvaluationPoint> fresh;
   if (!sample.learner.has_value()) return fresh;
+  skipped_.insert(sample.learner->skipped_iterations().begin(), sample.learner->skipped_iterations().end());
   for (const EvaluationReport& report : sample.learner->evaluations()) {
     if (Knows(report)) continue;
-    fresh.push_back(
-        {.opponent = report.opponent(),
-         .policy_version = report.policy_version(),
-         .updates = report.updates(),
-         .steps = StepsAt(report.updates()),
-         .episodes = report.episodes(),
-         .score_mean = report.score_mean(),
-         .score_stderr = report.score_stderr(),
-         .return_mean = report.return_mean(),
-         .return_std = report.return_stderr() * std::sqrt(static_cast<double>(report.episodes()))});
+    fresh.push_back({.opponent = report.opponent(),
+                     .policy_version = report.policy_version(),
+                     .updates = report.updates(),
+                     .steps = StepsAt(report.updates()),
+                     .episodes = report.episodes(),
+                     .score_mean = report.score_mean(),
+                     .score_stderr = report.score_stderr(),
+                     .return_mean = report.return_mean(),
+                     .return_std = report.return_stderr() * std::sqrt(static_cast<double>(report.episodes())),
+                     .iteration = report.has_iteration() ? std::optional(report.iteration()) : std::nullopt});
   }
   points_.insert(points_.end(), fresh.begin(), fresh.end());
   return fresh;
@@ -53,6 +54,12 @@ bool EvaluationCurve::Knows(const EvaluationReport& report) const {
   return std::any_of(points_.rbegin(), points_.rend(), [&report](const EvaluationPoint& point) {
     return point.policy_version == report.policy_version() && point.opponent == report.opponent();
   });
+}
+
+std::optional<std::uint64_t> EvaluationCurve::LastIteration() const {
+  std::optional<std::uint64_t> last;
+  for (const EvaluationPoint& point : points_) last = std::max(last, point.iteration);
+  return last;
 }
 
 std::optional<EvaluationPoint> EvaluationCurve::AfterOffline(std::uint64_t offline_updates) const {

@@ -5,6 +5,7 @@
 #include <deque>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,19 +23,25 @@ struct EvaluationPoint {
   double score_mean = std::numeric_limits<double>::quiet_NaN();  // NaN: the environment has no score
   double score_stderr = std::numeric_limits<double>::quiet_NaN();
   double return_mean = 0;
-  double return_std = 0;  // of single episodes; NaN for one alone
+  double return_std = 0;                                  // of single episodes; NaN for one alone
+  std::optional<std::uint64_t> iteration = std::nullopt;  // of a run that is evaluated by updates
 };
 
 // One thread.
 class EvaluationCurve {
  public:
   EvaluationCurve() = default;
-  explicit EvaluationCurve(std::vector<EvaluationPoint> earlier) : points_(std::move(earlier)) {}
+  explicit EvaluationCurve(std::vector<EvaluationPoint> earlier, std::set<std::uint64_t> skipped = {})
+      : points_(std::move(earlier)), skipped_(std::move(skipped)) {}
 
   // Takes the evaluations that it has not seen, and gives them.
   std::vector<EvaluationPoint> Update(const RunSample& sample);
 
   const std::vector<EvaluationPoint>& points() const { return points_; }
+  // The iterations that the evaluators have said to skip.
+  const std::set<std::uint64_t>& skipped() const { return skipped_; }
+  // The latest iteration that was evaluated; empty where none was, and in a run that is evaluated by time.
+  std::optional<std::uint64_t> LastIteration() const;
 
   // How good the policy was when an offline phase of that many updates ended: the last evaluation of a policy
   // that no actor had followed yet, unless that was made before the last tenth of the phase and there is one
@@ -56,6 +63,7 @@ class EvaluationCurve {
   bool Knows(const EvaluationReport& report) const;
 
   std::vector<EvaluationPoint> points_;
+  std::set<std::uint64_t> skipped_;
   std::deque<Moment> moments_;  // ascending
 };
 

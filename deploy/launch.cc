@@ -83,6 +83,7 @@ Launch::Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_p
   summary_.config = plan_.config_source;
   summary_.seed_buffer.path = plan_.config.replay().seed().path();
   summary_.offline_updates = plan_.config.learner().offline_updates();
+  summary_.every_updates = plan_.config.evaluation().every_updates();
   summary_.ended = "running";
   ++summary_.launches;
 }

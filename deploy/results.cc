@@ -36,6 +36,7 @@ Json ToJson(const EvaluationPoint& point) {
     json["score_stderr"] = Number(point.score_stderr);
   }
   if (!point.opponent.empty()) json["opponent"] = point.opponent;
+  if (point.iteration.has_value()) json["iteration"] = *point.iteration;
   return json;
 }
 
@@ -92,9 +93,20 @@ std::vector<EvaluationPoint> ReadCurve(const Json& json) {
          .score_mean = Real(entry, "score_mean", kNaN),
          .score_stderr = Real(entry, "score_stderr", kNaN),
          .return_mean = Real(entry, "return_mean", kNaN),
-         .return_std = Real(entry, "return_std", kNaN)});
+         .return_std = Real(entry, "return_std", kNaN),
+         .iteration = entry.contains("iteration") ? std::optional(Count(entry, "iteration")) : std::nullopt});
   }
   return points;
+}
+
+std::set<std::uint64_t> ReadSkipped(const Json& json) {
+  std::set<std::uint64_t> skipped;
+  const auto found = json.find("skipped_iterations");
+  if (found == json.end() || !found->is_array()) return skipped;
+  for (const Json& entry : *found) {
+    if (entry.is_number_unsigned()) skipped.insert(entry.get<std::uint64_t>());
+  }
+  return skipped;
 }
 
 }  // namespace
@@ -141,6 +153,15 @@ std::optional<EvaluationPoint> RunSummary::AfterOffline() const {
   return offline_updates > 0 ? curve.AfterOffline(offline_updates) : std::nullopt;
 }
 
+std::set<std::uint64_t> RunSummary::SkippedIterations() const {
+  std::set<std::uint64_t> skipped = curve.skipped();
+  if (every_updates == 0 || ended == "running") return skipped;
+  const std::optional<std::uint64_t> last = curve.LastIteration();
+  for (std::uint64_t k = last.has_value() ? *last + 1 : 0; k < updates / every_updates; ++k)
+    skipped.insert(k);
+  return skipped;
+}
+
 absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder) {
   Json evaluations = Json::array();
   for (const EvaluationPoint& point : summary.curve.points()) evaluations.push_back(ToJson(point));
@@ -163,6 +184,7 @@ absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder) {
                    {"policy_version", summary.policy_version},
                    {"restarts", summary.restarts},
                    {"evaluations", evaluations},
+                   {"skipped_iterations", summary.SkippedIterations()},
                    {"final", final_results}});
   // Paths and logs may hold bytes that are not UTF-8.
   const std::string text = json.dump(2, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace);
@@ -183,7 +205,7 @@ RunSummary ReadSummary(const RunFolder& folder) {
   summary.updates = Count(json, "updates");
   summary.policy_version = Count(json, "policy_version");
   summary.restarts = Count(json, "restarts");
-  summary.curve = EvaluationCurve(ReadCurve(json));
+  summary.curve = EvaluationCurve(ReadCurve(json), ReadSkipped(json));
   return summary;
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -50,10 +51,14 @@ struct RunSummary {
   SeedSummary seed_buffer;
   std::uint64_t offline_updates = 0;  // that the config asks for
   EvaluationCurve curve;              // during training
+  std::uint64_t every_updates = 0;    // of evaluations, that the config asks for; 0: by time
   std::vector<EvaluationResult> final_results;
 
   // Takes over the counters of the newest answers, and gives the evaluations that are new.
   std::vector<EvaluationPoint> Update(const RunSample& sample);
+  // The iterations that no evaluation was made of: those that the evaluator skipped, and once training has
+  // ended those that it had not come to, but for the last one, whose policy the final evaluation is of.
+  std::set<std::uint64_t> SkippedIterations() const;
   // See EvaluationCurve; empty without an offline phase.
   std::optional<EvaluationPoint> AfterOffline() const;
 };

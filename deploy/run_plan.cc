@@ -13,6 +13,7 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "actor/exploration.h"
 #include "core/file_io.h"
 #include "core/status_macros.h"
 #include "deploy/results.h"
@@ -143,10 +144,10 @@ ProcessSpec MakeProcess(const RunPlan& plan, const std::string& programs, const 
 }
 
 ProcessSpec MakeActor(const RunPlan& plan, const std::string& programs, const std::string& name, int index) {
-  return MakeProcess(
-      plan, programs, name, "dbr-actor",
-      {"--index", absl::StrCat(index), "--replay", plan.replay_address, "--learner", plan.learner_address},
-      kStopActors);
+  return MakeProcess(plan, programs, name, "dbr-actor",
+                     {"--index", absl::StrCat(index), "--processes", absl::StrCat(plan.actors), "--replay",
+                      plan.replay_address, "--learner", plan.learner_address},
+                     kStopActors);
 }
 
 // What differs between two messages of one type, as "path: before -> now" lines.
@@ -184,6 +185,7 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
   if (options.resume) RETURN_IF_ERROR(CheckRunFolder(RunFolder{options.run_dir}));
   ASSIGN_OR_RETURN(plan.config, LoadForLaunch(options));
   ASSIGN_OR_RETURN(plan.env, SpecOf(plan.config));
+  RETURN_IF_ERROR(CheckExploration(plan.env, plan.config.actor()));
   plan.folder.root = options.run_dir.empty() ? DefaultRunDir(plan.config, now) : options.run_dir;
   plan.config_source = options.config.empty() ? plan.folder.config() : options.config;
   plan.resume = options.resume;
@@ -222,6 +224,8 @@ std::vector<ProcessSpec> Services(const RunPlan& plan, const std::string& progra
   }
   all.push_back(MakeActor(plan, programs, "evaluator", 0));
   all.back().command.push_back("--evaluate");
+  if (plan.resume) all.back().command.push_back("--resume");
+  all.back().restart_arguments = {"--resume"};
   return all;
 }
 

@@ -72,6 +72,7 @@ grpc::Status PolicyService::Status(grpc::ServerContext*, const LearnerStatusRequ
   absl::MutexLock lock(&mutex_);
   *reply = status_;
   for (const auto& [opponent, report] : evaluations_) *reply->add_evaluations() = report;
+  reply->mutable_skipped_iterations()->Assign(skipped_iterations_.begin(), skipped_iterations_.end());
   reply->set_subscribers(static_cast<std::uint32_t>(sent_versions_.size()));
   std::uint64_t oldest = reply->policy_version();
   for (const auto& [subscription, version] : sent_versions_) oldest = std::min(oldest, version);
@@ -88,6 +89,7 @@ grpc::Status PolicyService::ReportEvaluation(grpc::ServerContext*, const Evaluat
   {
     absl::MutexLock lock(&mutex_);
     evaluations_[report->opponent()] = *report;
+    skipped_iterations_.insert(report->skipped_iterations().begin(), report->skipped_iterations().end());
   }
   on_evaluation_(*report);
   return grpc::Status::OK;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "absl/base/thread_annotations.h"
@@ -22,7 +23,7 @@ class PolicyService final : public Policy::Service {
 
   // Offers a snapshot to all subscribers; its version grows from call to call.
   void Publish(const PolicySnapshot& snapshot);
-  // What Status answers, but for subscribers and evaluations, which the service knows itself.
+  // What Status answers, but for subscribers and what evaluators report, which the service knows itself.
   void SetStatus(LearnerStatus status);
   // Ends all subscriptions; before the server's Shutdown.
   void Close();
@@ -43,7 +44,8 @@ class PolicyService final : public Policy::Service {
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   std::shared_ptr<const PolicyMessage> newest_ ABSL_GUARDED_BY(mutex_);
   LearnerStatus status_ ABSL_GUARDED_BY(mutex_);
-  std::map<std::string, EvaluationReport> evaluations_ ABSL_GUARDED_BY(mutex_);   // by opponent
+  std::map<std::string, EvaluationReport> evaluations_ ABSL_GUARDED_BY(mutex_);  // by opponent
+  std::set<std::uint64_t> skipped_iterations_ ABSL_GUARDED_BY(mutex_);
   std::map<std::uint64_t, std::uint64_t> sent_versions_ ABSL_GUARDED_BY(mutex_);  // by subscription
   std::uint64_t next_subscription_ ABSL_GUARDED_BY(mutex_) = 0;
 };

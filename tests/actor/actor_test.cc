@@ -130,7 +130,7 @@ TEST_F(ActorTest, AllThatTheStepLoopSaysArrivesOnce) {
                            .buffered_transitions = 300});
   std::uint64_t episodes = 0, plus = 0, minus = 0, unjudged = 0;
   double returns = 0;
-  StepLoop loop(MakeLines(10), {.epsilon = 0.2}, Rng(1),
+  StepLoop loop(MakeLines(10), {.exploration = {.epsilon = 0.2}}, Rng(1),
                 [&](const TransitionView& transition, float advantage, std::uint64_t version,
                     const std::optional<EpisodeEnd>& end) {
                   plus += advantage >= 0;
@@ -233,6 +233,16 @@ TEST_F(ActorTest, EndsWithTheErrorOfAReplayServerForSomethingElse) {
   const absl::Status status = MakeActor()->Run();
   EXPECT_TRUE(absl::IsInvalidArgument(status)) << status;
   EXPECT_THAT(std::string(status.message()), HasSubstr("observation_width"));
+}
+
+TEST_F(ActorTest, RefusesNoiseOnDiscreteActions) {
+  config_.mutable_actor()->set_action_noise(0.1);
+  const absl::Status status =
+      Actor::Create(
+          {.config = config_, .replay_address = replay_address_, .learner_address = learner_address_})
+          .status();
+  EXPECT_TRUE(absl::IsInvalidArgument(status)) << status;
+  EXPECT_THAT(std::string(status.message()), HasSubstr("discrete actions of environment 'connect4'"));
 }
 
 TEST_F(ActorTest, RefusesAnUnknownOpponent) {

@@ -11,32 +11,47 @@
 namespace dbr {
 namespace {
 
+using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::Pair;
+using PolicyPtr = std::shared_ptr<const PolicyNetworks>;
 
 // The loop with a clock of its own: each wait moves the time to the deadline and then plays the script's next
 // entry.
 class EvaluationLoopTest : public ::testing::Test {
  protected:
   EvaluationLoopTest()
-      : loop_({.opponents = {"random", "one_ply"}, .episodes = 4, .seed = 1, .every = absl::Seconds(10)},
-              Ports()) {}
+      : EvaluationLoopTest(
+            {.opponents = {"random", "one_ply"}, .episodes = 4, .seed = 1, .every = absl::Seconds(10)}) {}
+  explicit EvaluationLoopTest(const EvaluationLoopOptions& options) : loop_(options, Ports()) {}
 
   EvaluationLoopPorts Ports() {
     return {.newest_policy = [this] { return newest_; },
             .report = [this](const EvaluationReport& report) { return Report(report); },
+            .next_policy = [this](const auto& last, absl::Duration) { return NextPolicy(last); },
             .keep_best = [this](const PolicySnapshot& snapshot) { kept_.push_back(snapshot.version); },
             .now = [this] { return now_; },
             .wait_until =
                 [this](absl::Time deadline) {
                   waits_.push_back(deadline - now_);
                   now_ = std::max(now_, deadline);
-                  if (script_.empty()) return loop_.Close();
-                  const auto next = std::move(script_.front());
-                  script_.pop_front();
-                  next();
+                  PlayNext();
                 }};
+  }
+
+  // What the script's next entry leaves behind: a policy, an error, or nothing new before the deadline.
+  absl::StatusOr<PolicyPtr> NextPolicy(const PolicyPtr& last) {
+    PlayNext();
+    if (newest_.ok() && *newest_ == last) return absl::DeadlineExceededError("no new policy");
+    return newest_;
+  }
+
+  void PlayNext() {
+    if (script_.empty()) return loop_.Close();
+    const auto next = std::move(script_.front());
+    script_.pop_front();
+    next();
   }
 
   absl::Status Report(const EvaluationReport& report) {
@@ -45,6 +60,7 @@ class EvaluationLoopTest : public ::testing::Test {
     if (!learner_.ok()) return learner_;
     reports_.emplace_back(report.policy_version(), report.opponent());
     scores_[report.policy_version()] += report.score_mean();
+    whole_reports_.push_back(report);
     kept_at_report_.push_back(kept_);
     return absl::OkStatus();
   }
@@ -53,10 +69,11 @@ class EvaluationLoopTest : public ::testing::Test {
 
   absl::Time now_ = absl::UnixEpoch();
   absl::Duration time_of_a_report_ = absl::ZeroDuration();
-  absl::StatusOr<std::shared_ptr<const PolicyNetworks>> newest_ = nullptr;
+  absl::StatusOr<PolicyPtr> newest_ = nullptr;
   absl::Status learner_;
   int attempts_ = 0;
   std::vector<std::pair<std::uint64_t, std::string>> reports_;
+  std::vector<EvaluationReport> whole_reports_;
   std::map<std::uint64_t, double> scores_;  // of a version, summed over the opponents
   std::vector<std::uint64_t> kept_;         // versions, as they were the best
   std::vector<std::vector<std::uint64_t>> kept_at_report_;
@@ -133,6 +150,89 @@ TEST_F(EvaluationLoopTest, DropsReportsThatTheLearnerRefuses) {
 TEST_F(EvaluationLoopTest, EndsWithTheErrorOfItsPolicies) {
   newest_ = absl::InvalidArgumentError("another environment");
   EXPECT_TRUE(absl::IsInvalidArgument(loop_.Run()));
+}
+
+// Version v has 10 v updates: iteration v / 2.
+class EvaluationByUpdatesTest : public EvaluationLoopTest {
+ protected:
+  explicit EvaluationByUpdatesTest(bool resumed = false)
+      : EvaluationLoopTest({.opponents = {"random"},
+                            .episodes = 4,
+                            .seed = 1,
+                            .every = absl::Seconds(10),
+                            .every_updates = 20,
+                            .resumed = resumed}) {}
+
+  // Runs the loop while the learner publishes these versions in turn.
+  void Publish(const std::vector<std::uint64_t>& versions) {
+    for (const std::uint64_t version : versions) script_.push_back([this, version] { Push(version); });
+    ASSERT_TRUE(loop_.Run().ok());
+  }
+  std::vector<std::uint64_t> iterations() const {
+    std::vector<std::uint64_t> iterations;
+    for (const EvaluationReport& report : whole_reports_) iterations.push_back(report.iteration());
+    return iterations;
+  }
+  std::vector<std::vector<std::uint64_t>> skipped() const {
+    std::vector<std::vector<std::uint64_t>> skipped;
+    for (const EvaluationReport& report : whole_reports_)
+      skipped.emplace_back(report.skipped_iterations().begin(), report.skipped_iterations().end());
+    return skipped;
+  }
+};
+
+TEST_F(EvaluationByUpdatesTest, EvaluatesTheFirstPolicyThatItSeesOfEachIteration) {
+  Publish({0, 1, 2, 3, 5, 6});
+  EXPECT_THAT(reports_,
+              ElementsAre(Pair(0, "random"), Pair(2, "random"), Pair(5, "random"), Pair(6, "random")));
+  EXPECT_THAT(iterations(), ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(skipped(), Each(IsEmpty()));
+}
+
+TEST_F(EvaluationByUpdatesTest, NamesTheIterationsThatHavePassedMeanwhile) {
+  Publish({0, 10, 11, 12, 18});
+  EXPECT_THAT(iterations(), ElementsAre(0, 5, 6, 9));
+  EXPECT_THAT(skipped(), ElementsAre(IsEmpty(), ElementsAre(1, 2, 3, 4), IsEmpty(), ElementsAre(7, 8)));
+}
+
+TEST_F(EvaluationByUpdatesTest, NamesWhatPassedBeforeItsFirstPolicy) {
+  Publish({4});
+  EXPECT_THAT(skipped(), ElementsAre(ElementsAre(0, 1)));
+}
+
+TEST_F(EvaluationByUpdatesTest, WaitsForPoliciesAndNeverForTheTime) {
+  Publish({0, 2, 4});
+  EXPECT_THAT(waits_, IsEmpty());
+  EXPECT_EQ(now_, absl::UnixEpoch());
+}
+
+TEST_F(EvaluationByUpdatesTest, AnIterationThatIsTrainedAgainIsNotEvaluatedAgain) {
+  Publish({0, 2, 4, 2, 3, 4, 6});
+  EXPECT_THAT(iterations(), ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(skipped(), Each(IsEmpty()));
+}
+
+TEST_F(EvaluationByUpdatesTest, TriesKeptReportsAgainWhileThereIsNoNewPolicy) {
+  learner_ = absl::UnavailableError("nobody there");
+  script_ = {[&] { Push(0); }, [] {}, [&] { learner_ = absl::OkStatus(); }};
+  Publish({});
+  EXPECT_THAT(iterations(), ElementsAre(0));
+}
+
+TEST_F(EvaluationByUpdatesTest, EndsWithTheErrorOfItsPolicies) {
+  script_ = {[&] { newest_ = absl::InvalidArgumentError("another environment"); }};
+  EXPECT_TRUE(absl::IsInvalidArgument(loop_.Run()));
+}
+
+class ResumedEvaluationTest : public EvaluationByUpdatesTest {
+ protected:
+  ResumedEvaluationTest() : EvaluationByUpdatesTest(/*resumed=*/true) {}
+};
+
+TEST_F(ResumedEvaluationTest, LeavesTheIterationsBeforeItsFirstPolicyAlone) {
+  Publish({8, 14});
+  EXPECT_THAT(iterations(), ElementsAre(4, 7));
+  EXPECT_THAT(skipped(), ElementsAre(IsEmpty(), ElementsAre(5, 6)));
 }
 
 TEST(OpponentsToEvaluateTest, PrefersTheConfigAndKnowsEnvironmentsWithoutOpponents) {

@@ -21,7 +21,9 @@
 namespace dbr {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 constexpr absl::Duration kLong = absl::Seconds(30);  // reached only where something is wrong
 
@@ -180,6 +182,25 @@ TEST_F(ProgramTest, EvaluatorReportsToTheLearnerUntilItIsStopped) {
     EXPECT_NEAR(report.return_mean(), 2 * report.score_mean() - 1, 1e-12);
     EXPECT_GE(report.score_stderr(), 0);
   }
+}
+
+TEST_F(ProgramTest, EvaluatorByUpdatesWakesForANewPolicyAndNamesWhatItSkips) {
+  LearnerDouble learner(folder_.Address("learner"));
+  learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
+  Program evaluator(
+      EvaluatorFlags(std::string(kSmall) +
+                     "evaluation { opponents: 'random' episodes: 6 every_s: 1000000 every_updates: 20 }"));
+  ASSERT_TRUE(learner.AwaitReports(1, kLong));
+  learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 8)));
+  ASSERT_TRUE(learner.AwaitReports(2, kLong));
+  evaluator.Signal(SIGTERM);
+  EXPECT_EQ(evaluator.Wait(), 0) << evaluator.output();
+  const std::vector<EvaluationReport> reports = learner.reports();
+  EXPECT_EQ(reports[0].iteration(), 0);
+  EXPECT_THAT(reports[0].skipped_iterations(), IsEmpty());
+  EXPECT_EQ(reports[1].iteration(), 4);
+  EXPECT_THAT(reports[1].skipped_iterations(), ElementsAre(1, 2, 3));
+  EXPECT_THAT(evaluator.output(), HasSubstr("iterations 1 to 3 are skipped, 3 so far"));
 }
 
 }  // namespace

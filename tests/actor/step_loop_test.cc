@@ -137,7 +137,7 @@ TEST(StepLoopTest, JudgesTheActionThatWasTakenByThePushedCritics) {
   const EnvSpec spec = LineEnv().spec();
   for (const double epsilon : {0.0, 1.0}) {
     std::vector<Seen> seen;
-    StepLoop loop(MakeLines(kEnvs), {.mode = MODE, .epsilon = epsilon}, Rng(5), Into(&seen));
+    StepLoop loop(MakeLines(kEnvs), {.mode = MODE, .exploration = {.epsilon = epsilon}}, Rng(5), Into(&seen));
     PolicyRunner runner;
     for (const std::uint64_t version : {7, 8, 9}) {
       const auto policy = UntrainedPolicy(spec, version);
@@ -162,7 +162,9 @@ TEST(StepLoopTest, WithoutCriticsTransitionsAreNotYetJudged) {
 }
 
 TEST(StepLoopTest, TheSameSeedGivesTheSameTransitions) {
-  const StepLoopOptions options = {.mode = SAMPLE, .epsilon = 0.3, .epsilon_ladder = 2};
+  const StepLoopOptions options = {
+      .mode = SAMPLE,
+      .exploration = {.epsilon = 0.6, .epsilon_ladder = 2, .epsilon_decay_steps = 200, .final_epsilon = 0.1}};
   const std::vector<Seen> a = Walk(options, 7), b = Walk(options, 7), other = Walk(options, 8);
   int different = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {

@@ -218,6 +218,33 @@ TEST(ResultsTest, SummaryKeepsItsCountersOverAResume) {
   EXPECT_EQ(read.transitions, 123456);
 }
 
+TEST(ResultsTest, SummaryNamesTheIterationsThatWereNotEvaluated) {
+  TempDir folder;
+  const RunFolder run{folder.path()};
+  RunSummary summary;
+  summary.every_updates = 1000;
+  summary.ended = "running";
+  RunSample sample;
+  sample.learner = SomeStatus();
+  sample.learner->set_updates(9500);
+  sample.learner->mutable_evaluations(0)->set_iteration(5);
+  sample.learner->add_skipped_iterations(2);
+  sample.learner->add_skipped_iterations(4);
+  summary.Update(sample);
+  const auto written = [&] {
+    EXPECT_TRUE(WriteSummary(summary, run).ok());
+    return Json::parse(*ReadFile(run.summary()));
+  };
+  EXPECT_EQ(written()["skipped_iterations"], Json({2, 4}));
+  // Those that it had not come to; of the policy of the last one is the final evaluation.
+  summary.ended = "max_updates";
+  const Json json = written();
+  EXPECT_EQ(json["skipped_iterations"], Json({2, 4, 6, 7, 8}));
+  EXPECT_EQ(json["evaluations"][0]["iteration"], 5);
+  EXPECT_EQ(*ReadSummary(run).curve.LastIteration(), 5);
+  EXPECT_EQ(ReadSummary(run).SkippedIterations(), summary.SkippedIterations());
+}
+
 TEST(ResultsTest, ADamagedSummaryCountsAsNone) {
   TempDir folder;
   const RunFolder run{folder.path()};

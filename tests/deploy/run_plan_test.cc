@@ -141,20 +141,28 @@ TEST_F(RunPlanTest, StartsTheServicesBeforeThoseWhoUseThem) {
   EXPECT_EQ(names, (std::vector<std::string>{"replay", "learner", "evaluator", "actor-0", "actor-1"}));
   EXPECT_EQ(all[0].command[0], "bin/dbr-replay");
   EXPECT_THAT(all[2].command, Contains("--evaluate"));
-  EXPECT_THAT(all[4].command, IsSupersetOf({"--index", "1"}));
+  EXPECT_THAT(all[4].command, IsSupersetOf({"--index", "1", "--processes", "2"}));
   EXPECT_LT(all[3].stop_rank, all[1].stop_rank);
   EXPECT_LT(all[1].stop_rank, all[0].stop_rank);
   plan->resume = true;
   const std::vector<ProcessSpec> resumed = Services(*plan, "bin");
   EXPECT_THAT(resumed[0].command, Contains("--resume"));
   EXPECT_THAT(resumed[1].command, Contains("--resume"));
-  EXPECT_THAT(resumed[2].command, Not(Contains("--resume")));
+  EXPECT_THAT(resumed[2].command, Contains("--resume"));
+  EXPECT_THAT(Actors(*plan, "bin")[0].command, Not(Contains("--resume")));
 }
 
 TEST_F(RunPlanTest, RefusesAnUnknownEnvironmentBeforeItMakesAFolder) {
   const auto plan = PrepareRun(Options({"env.name=checkers"}), kNow);
   EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(plan.status().message()), HasSubstr("unknown environment \"checkers\""));
+  EXPECT_FALSE(std::filesystem::exists(run_));
+}
+
+TEST_F(RunPlanTest, RefusesNoiseOnDiscreteActionsBeforeItMakesAFolder) {
+  const auto plan = PrepareRun(Options({"actor.action_noise=0.1"}), kNow);
+  EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(plan.status().message()), HasSubstr("actor.action_noise: expected 0"));
   EXPECT_FALSE(std::filesystem::exists(run_));
 }
 

@@ -104,6 +104,22 @@ TEST_F(PolicyServiceTest, KeepsTheNewestEvaluationOfEachOpponent) {
   EXPECT_EQ(reports_.size(), 2u);
 }
 
+TEST_F(PolicyServiceTest, KeepsWhatEvaluatorsSkipped) {
+  for (const std::vector<std::uint64_t>& skipped : {std::vector<std::uint64_t>{5, 6}, {5, 6}, {}, {2}}) {
+    EvaluationReport report;
+    report.set_episodes(10);
+    report.mutable_skipped_iterations()->Assign(skipped.begin(), skipped.end());
+    grpc::ClientContext context;
+    EvaluationReportReply reply;
+    ASSERT_TRUE(stub_->ReportEvaluation(&context, report, &reply).ok());
+  }
+  service_.SetStatus(LearnerStatus());
+  grpc::ClientContext context;
+  LearnerStatus status;
+  ASSERT_TRUE(stub_->Status(&context, LearnerStatusRequest(), &status).ok());
+  EXPECT_THAT(status.skipped_iterations(), testing::ElementsAre(2, 5, 6));
+}
+
 TEST_F(PolicyServiceTest, RefusesAnEvaluationWithoutEpisodes) {
   grpc::ClientContext context;
   EvaluationReportReply reply;
