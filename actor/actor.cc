@@ -13,6 +13,7 @@
 #include "core/safetensors.h"
 #include "core/status_macros.h"
 #include "proto/channel.h"
+#include "proto/config_file.h"
 #include "proto/grpc_status.h"
 #include "replay/client.h"
 
@@ -48,7 +49,7 @@ WriterOptions Writing(const ActorOptions& options, const EnvSpec& env) {
   WriterOptions writing;
   writing.address = options.replay_address;
   writing.name = absl::StrCat("actor-", options.index);
-  writing.layout = TransitionLayout::Of(env);
+  writing.layout = TransitionLayout::Of(env, NeedsReturns(options.config.algorithm()));
   writing.batch_bytes = actor.batch_bytes();
   writing.window = static_cast<int>(actor.window());
   writing.buffered_transitions =
@@ -116,8 +117,11 @@ absl::Status Actor::Act() {
                    subscriber_->WaitForFirst(absl::InfiniteDuration()));
   spdlog::info("acting in {} environments, from policy version {}", envs_->size(), first->snapshot().version);
   const ActorConfig& actor = options_.config.actor();
-  const StepLoopOptions stepping = {
-      .mode = actor.mode(), .exploration = Exploring(), .discount = options_.config.algorithm().discount()};
+  const StepLoopOptions stepping = {.mode = actor.mode(),
+                                    .exploration = Exploring(),
+                                    .discount = options_.config.algorithm().discount(),
+                                    .with_returns = NeedsReturns(options_.config.algorithm()),
+                                    .reward_scale = options_.config.algorithm().reward_scale()};
   // An actor that starts again in the middle of a run must not play its first games once more.
   const Rng rng = ActorRng(options_).Fork(first->snapshot().version);
   StepLoop loop(std::move(envs_), stepping, rng,
@@ -130,6 +134,10 @@ absl::Status Actor::Act() {
     ASSIGN_OR_RETURN(const PolicySubscriber::PolicyPtr policy, subscriber_->Current());
     RETURN_IF_ERROR(loop.Step(*policy));
     worlds.Tell(loop.counters());
+  }
+  if (loop.held_back() > 0) {
+    spdlog::info("{} transitions of episodes that had not ended are dropped, for their returns are not known",
+                 loop.held_back());
   }
   return absl::OkStatus();
 }

@@ -16,18 +16,22 @@ StepLoop::StepLoop(std::unique_ptr<VectorEnv> envs, const StepLoopOptions& optio
       sink_(std::move(sink)),
       actions_(MatrixX<float>::Zero(envs_->spec().actions.width(), envs_->size())),
       advantages_(VectorX<float>::Zero(envs_->size())),
+      next_values_(VectorX<float>::Zero(envs_->size())),
       episodes_(envs_->size()) {
+  if (options.with_returns) {
+    returns_.emplace(TransitionLayout::Of(envs_->spec(), /*with_returns=*/true), envs_->size(),
+                     ReturnOptions{options.reward_scale, options.discount}, sink_);
+  }
   for (int i = 0; i < envs_->size(); ++i) envs_->Reset(i, rng_());
 }
 
 absl::Status StepLoop::Step(const PolicyNetworks& policy) {
   RETURN_IF_ERROR(runner_.Act(policy, options_.mode, envs_->observations(), envs_->masks(), rng_, actions_));
   counters_.explored += exploration_.Apply(envs_->masks(), rng_, &actions_);
-  runner_.Advantages(actions_, rng_, advantages_);
-  for (int i = 0; i < envs_->size(); ++i) {
-    envs_->Step(i, actions_);
-    RETURN_IF_ERROR(Emit(i, policy.snapshot().version));
-  }
+  Judge(policy);
+  for (int i = 0; i < envs_->size(); ++i) envs_->Step(i, actions_);
+  if (returns_.has_value()) JudgeCuts(policy);
+  for (int i = 0; i < envs_->size(); ++i) RETURN_IF_ERROR(Emit(i, policy.snapshot().version));
   envs_->Advance();
   for (int i = 0; i < envs_->size(); ++i) {
     if (!envs_->results()[i].done()) continue;
@@ -35,6 +39,28 @@ absl::Status StepLoop::Step(const PolicyNetworks& policy) {
     episodes_[i] = {};
   }
   return absl::OkStatus();
+}
+
+void StepLoop::Judge(const PolicyNetworks& policy) {
+  if (returns_.has_value()) {
+    runner_.Values(policy, envs_->observations(), envs_->masks(), rng_, advantages_);
+  } else {
+    runner_.Advantages(actions_, rng_, advantages_);
+  }
+}
+
+void StepLoop::JudgeCuts(const PolicyNetworks& policy) {
+  cuts_.clear();
+  for (int i = 0; i < envs_->size(); ++i) {
+    const StepResult& result = envs_->results()[i];
+    if (result.done() && !result.terminated) cuts_.push_back(i);
+  }
+  if (cuts_.empty()) return;
+  cut_observations_ = envs_->next_observations()(Eigen::all, cuts_);
+  cut_masks_ = envs_->next_masks()(Eigen::all, cuts_);
+  cut_values_.resize(static_cast<Eigen::Index>(cuts_.size()));
+  runner_.Values(policy, cut_observations_, cut_masks_, rng_, cut_values_);
+  next_values_(cuts_) = cut_values_;
 }
 
 absl::Status StepLoop::Emit(int i, std::uint64_t critic_version) {
@@ -58,7 +84,11 @@ absl::Status StepLoop::Emit(int i, std::uint64_t critic_version) {
                    .score = envs_->spec().has_score ? result.score : std::numeric_limits<float>::quiet_NaN(),
                    .length = episode.length};
   }
-  RETURN_IF_ERROR(sink_(transition, advantages_[i], critic_version, end));
+  if (returns_.has_value()) {
+    RETURN_IF_ERROR(returns_->Add(i, transition, {advantages_[i], next_values_[i], critic_version}, end));
+  } else {
+    RETURN_IF_ERROR(sink_(transition, advantages_[i], critic_version, end));
+  }
   ++counters_.transitions;
   if (end.has_value()) ++counters_.episodes;
   if (result.broken) ++counters_.broken;

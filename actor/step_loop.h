@@ -2,12 +2,12 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "actor/episode_returns.h"
 #include "actor/exploration.h"
 #include "actor/vector_env.h"
 #include "core/rng.h"
@@ -17,16 +17,13 @@
 
 namespace dbr {
 
-// Takes one transition, valid during the call, with its first advantage (kUnjudged where there is none), the
-// version of the critic behind it, and how the episode went where this transition ended it.
-using TransitionSink =
-    std::function<absl::Status(const TransitionView& transition, float advantage,
-                               std::uint64_t critic_version, const std::optional<EpisodeEnd>& end)>;
-
 struct StepLoopOptions {
   ActingMode mode = SAMPLE;
   ExplorationOptions exploration;
   double discount = 0.99;  // of every transition that does not end in a true terminal
+  // Transitions go out when their episode has ended, with their returns and R - V(s) as first advantage.
+  bool with_returns = false;
+  double reward_scale = 1;  // of the critics, for that advantage
 };
 
 struct StepCounters {
@@ -37,8 +34,8 @@ struct StepCounters {
 };
 
 // All environments take one step at a time; ended episodes restart with seeds drawn from `rng`, so that the
-// same rng and policies give the same transitions. Rewards go out as the environment gave them. One thread at
-// a time.
+// same rng and policies give the same transitions. Rewards go out as the environment gave them. With returns
+// an episode's transitions go out together when it has ended (EpisodeReturns). One thread at a time.
 class StepLoop {
  public:
   StepLoop(std::unique_ptr<VectorEnv> envs, const StepLoopOptions& options, const Rng& rng,
@@ -49,6 +46,8 @@ class StepLoop {
   absl::Status Step(const PolicyNetworks& policy);
 
   const StepCounters& counters() const { return counters_; }
+  // Transitions of episodes that have not ended, held back for their returns.
+  std::uint64_t held_back() const { return returns_.has_value() ? returns_->held() : 0; }
   const VectorEnv& envs() const { return *envs_; }
 
  private:
@@ -57,6 +56,10 @@ class StepLoop {
     int length = 0;
   };
 
+  // First advantages of the chosen actions, or with returns V(s) in their place.
+  void Judge(const PolicyNetworks& policy);
+  // V(s') of the environments whose episode was cut, into next_values_.
+  void JudgeCuts(const PolicyNetworks& policy);
   absl::Status Emit(int i, std::uint64_t critic_version);
 
   std::unique_ptr<VectorEnv> envs_;
@@ -65,8 +68,13 @@ class StepLoop {
   Rng rng_;
   TransitionSink sink_;
   PolicyRunner runner_;
-  MatrixX<float> actions_;     // [action width x envs]
-  VectorX<float> advantages_;  // [envs]
+  MatrixX<float> actions_;                       // [action width x envs]
+  VectorX<float> advantages_;                    // [envs]; with returns V(s)
+  std::optional<EpisodeReturns> returns_;        // with returns
+  std::vector<int> cuts_;                        // environments whose episode the newest step cut
+  MatrixX<float> cut_observations_, cut_masks_;  // [observation, mask width x cuts]
+  VectorX<float> cut_values_;                    // [cuts]
+  VectorX<float> next_values_;                   // [envs] V(s') of the cuts
   std::vector<Episode> episodes_;
   StepCounters counters_;
 };

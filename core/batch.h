@@ -23,6 +23,7 @@ struct BasicBatch {
   MatrixX<Scalar> masks;              // [actions x n] for a discrete space, else [0 x n]
   VectorX<Scalar> rewards;            // [n]
   VectorX<Scalar> discounts;          // [n]
+  VectorX<Scalar> returns;            // [n] Monte-Carlo returns, or [0] where the layout has none
   MatrixX<Scalar> next_observations;  // [observation x n]
   MatrixX<Scalar> next_masks;         // [actions x n] or [0 x n]
   std::vector<std::uint64_t> keys;    // [n] of the replay server; empty where the batch has none
@@ -36,6 +37,7 @@ struct BasicBatch {
     masks.resize(layout.mask_width, n);
     rewards.resize(n);
     discounts.resize(n);
+    returns.resize(layout.return_width * n);
     next_observations.resize(layout.observation_width, n);
     next_masks.resize(layout.mask_width, n);
     keys.resize(with_keys ? static_cast<std::size_t>(n) : 0);

@@ -93,7 +93,8 @@ absl::Status CheckSeed(const Config& config, const EnvSpec& env) {
         "this records one:\n  dbr dataset record --env ",
         env.name, " --quality medium --steps 1000000 --out ", env.name, "-medium.hdf5"));
   }
-  return CheckSeedFits(SeedOptionsFrom(config), TransitionLayout::Of(env), config.replay().capacity());
+  return CheckSeedFits(SeedOptionsFrom(config), TransitionLayout::Of(env, NeedsReturns(config.algorithm())),
+                       config.replay().capacity());
 }
 
 absl::Status CheckRunFolder(const RunFolder& folder) {

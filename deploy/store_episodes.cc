@@ -99,12 +99,14 @@ absl::StatusOr<RunStore> OpenRunStore(const std::string& run) {
   env_options.opponents.assign(config.env().opponents().begin(), config.env().opponents().end());
   ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv(env_options));
   RunStore opened{.env = env->spec(), .store = nullptr};
-  ASSIGN_OR_RETURN(opened.store, TransitionStore::Open({.path = folder.replay_store(),
-                                                        .env = env->spec().name,
-                                                        .layout = TransitionLayout::Of(env->spec()),
-                                                        .capacity = config.replay().capacity(),
-                                                        .byte_budget = config.replay().byte_budget(),
-                                                        .resume = true}));
+  ASSIGN_OR_RETURN(
+      opened.store,
+      TransitionStore::Open({.path = folder.replay_store(),
+                             .env = env->spec().name,
+                             .layout = TransitionLayout::Of(env->spec(), NeedsReturns(config.algorithm())),
+                             .capacity = config.replay().capacity(),
+                             .byte_budget = config.replay().byte_budget(),
+                             .resume = true}));
   return opened;
 }
 

@@ -87,7 +87,8 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
   ReplayClient draws(arguments.replay_address), labels(arguments.replay_address),
       stats(arguments.replay_address);
   const BatchNeeds needs = algorithm->needs();
-  const TransitionLayout layout{spec.observation_size, spec.actions.width(), spec.actions.mask_width()};
+  const TransitionLayout layout{spec.observation_size, spec.actions.width(), spec.actions.mask_width(),
+                                NeedsReturns(config.algorithm()) ? 1 : 0};
   TrainerParts parts{.algorithm = std::move(algorithm),
                      .policy_service = &service,
                      .metrics = metrics.get(),

@@ -39,18 +39,21 @@ void MaskedSoftmax(const ConstMatrixRef<Scalar>& logits, const ConstMatrixRef<Sc
 
 template <class Scalar>
 Scalar NegativeLogLikelihood(const Categorical<Scalar>& distribution, const ConstMatrixRef<Scalar>& actions,
-                             MatrixX<Scalar>* d_logits) {
+                             MatrixX<Scalar>* d_logits, const VectorX<Scalar>* weights) {
   const Eigen::Index n = distribution.probabilities.cols();
-  DBR_CHECK(actions.rows() == 1 && actions.cols() == n);
-  const Scalar weight = Scalar{1} / static_cast<Scalar>(n);
-  if (d_logits != nullptr) *d_logits = weight * distribution.probabilities;
+  DBR_CHECK(actions.rows() == 1 && actions.cols() == n && (weights == nullptr || weights->size() == n));
+  const Scalar each = Scalar{1} / static_cast<Scalar>(n);
+  if (d_logits != nullptr) d_logits->resize(distribution.probabilities.rows(), n);
   Scalar loss = 0;
   for (Eigen::Index j = 0; j < n; ++j) {
     const auto a = static_cast<Eigen::Index>(actions(0, j));
-    loss -= distribution.log_probabilities(a, j);
-    if (d_logits != nullptr) (*d_logits)(a, j) -= weight;
+    const Scalar weight = weights != nullptr ? each * (*weights)[j] : each;
+    loss -= weight * distribution.log_probabilities(a, j);
+    if (d_logits == nullptr) continue;
+    d_logits->col(j) = weight * distribution.probabilities.col(j);
+    (*d_logits)(a, j) -= weight;
   }
-  return loss * weight;
+  return loss;
 }
 
 template <class Scalar>
@@ -75,7 +78,7 @@ void SoftmaxGradient(const Categorical<Scalar>& p, MatrixX<Scalar>* gradient) {
   template void MaskedSoftmax<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&,        \
                                       Categorical<Scalar>*);                                               \
   template Scalar NegativeLogLikelihood<Scalar>(const Categorical<Scalar>&, const ConstMatrixRef<Scalar>&, \
-                                                MatrixX<Scalar>*);                                         \
+                                                MatrixX<Scalar>*, const VectorX<Scalar>*);                 \
   template void Entropy<Scalar>(const Categorical<Scalar>&, VectorX<Scalar>*);                             \
   template void KlDivergence<Scalar>(const Categorical<Scalar>&, const Categorical<Scalar>&,               \
                                      VectorX<Scalar>*);                                                    \

@@ -19,11 +19,11 @@ template <class Scalar>
 void MaskedSoftmax(const ConstMatrixRef<Scalar>& logits, const ConstMatrixRef<Scalar>& masks,
                    Categorical<Scalar>* distribution);
 
-// The mean over the batch of -log p(a|s), and its gradient with respect to the logits [actions x n] (may be
-// null). actions [1 x n] hold indices of legal actions.
+// The mean over the batch of -w log p(a|s), and its gradient with respect to the logits [actions x n] (may be
+// null). actions [1 x n] hold indices of legal actions; weights w [n] are constants, null: all 1.
 template <class Scalar>
 Scalar NegativeLogLikelihood(const Categorical<Scalar>& distribution, const ConstMatrixRef<Scalar>& actions,
-                             MatrixX<Scalar>* d_logits);
+                             MatrixX<Scalar>* d_logits, const VectorX<Scalar>* weights = nullptr);
 
 // [n] entropies in nats: -sum_a p log p.
 template <class Scalar>

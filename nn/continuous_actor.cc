@@ -7,6 +7,12 @@
 
 namespace dbr {
 
+void ContinuousActor::Evaluate(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations) {
+  head_.Split(MlpForward<float>(policy.policy_shape(), policy.snapshot().Find(kPolicyNetwork)->data(),
+                                observations, &policy_activations_),
+              kPolicyLogStd);
+}
+
 absl::Status ContinuousActor::Act(const PolicyNetworks& policy, ActingMode mode,
                                   const ConstMatrixRef<float>& observations, Rng& rng,
                                   Eigen::Ref<MatrixX<float>> actions) {
@@ -15,9 +21,7 @@ absl::Status ContinuousActor::Act(const PolicyNetworks& policy, ActingMode mode,
         "the mode SUPPORT serves discrete actions alone: use SAMPLE, MODE or "
         "GREEDY_Q");
   }
-  head_.Split(MlpForward<float>(policy.policy_shape(), policy.snapshot().Find(kPolicyNetwork)->data(),
-                                observations, &policy_activations_),
-              kPolicyLogStd);
+  Evaluate(policy, observations);
   if (!head_.mean().allFinite() || !head_.log_std().allFinite()) {
     return absl::InternalError(absl::StrCat("policy version ", policy.snapshot().version,
                                             " gives values that are not finite. Use an earlier checkpoint."));
@@ -73,21 +77,34 @@ void ContinuousActor::ChooseGreedy(const PolicyNetworks& policy, const ConstMatr
   }
 }
 
+void ContinuousActor::EvaluateSmaller(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
+                                      const ConstMatrixRef<float>& actions) {
+  values_ = Critic(policy, kCritic1, observations, actions).row(0);
+  values_ = values_.cwiseMin(Critic(policy, kCritic2, observations, actions).row(0).transpose());
+}
+
+void ContinuousActor::MeanValue(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
+                                Rng& rng, Eigen::Ref<VectorX<float>> values) {
+  Sample(PolicyRunner::kValueSamples, rng);
+  EvaluateSmaller(policy, observations, actions_);
+  const Eigen::Index n = observations.cols();
+  values.setZero();
+  for (Eigen::Index k = 0; k < PolicyRunner::kValueSamples; ++k) values += values_.segment(k * n, n);
+  values /= static_cast<float>(PolicyRunner::kValueSamples);
+}
+
 void ContinuousActor::Advantages(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
                                  const ConstMatrixRef<float>& actions, Rng& rng,
                                  Eigen::Ref<VectorX<float>> advantages) {
-  const auto smaller = [&](const ConstMatrixRef<float>& at) {
-    values_ = Critic(policy, kCritic1, observations, at).row(0);
-    values_ = values_.cwiseMin(Critic(policy, kCritic2, observations, at).row(0).transpose());
-  };
-  smaller(actions);
-  advantages = values_;
-  Sample(PolicyRunner::kValueSamples, rng);
-  smaller(actions_);
-  const Eigen::Index n = observations.cols();
-  for (Eigen::Index k = 0; k < PolicyRunner::kValueSamples; ++k) {
-    advantages -= values_.segment(k * n, n) / static_cast<float>(PolicyRunner::kValueSamples);
-  }
+  MeanValue(policy, observations, rng, advantages);
+  EvaluateSmaller(policy, observations, actions);
+  advantages = values_ - advantages;
+}
+
+void ContinuousActor::Values(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
+                             Rng& rng, Eigen::Ref<VectorX<float>> values) {
+  Evaluate(policy, observations);
+  MeanValue(policy, observations, rng, values);
 }
 
 }  // namespace dbr

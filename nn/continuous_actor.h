@@ -19,8 +19,18 @@ class ContinuousActor {
                    Rng& rng, Eigen::Ref<MatrixX<float>> actions);
   void Advantages(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
                   const ConstMatrixRef<float>& actions, Rng& rng, Eigen::Ref<VectorX<float>> advantages);
+  void Values(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations, Rng& rng,
+              Eigen::Ref<VectorX<float>> values);
 
  private:
+  // Evaluates the policy at the observations, into head_.
+  void Evaluate(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations);
+  // The smaller twin at the observations, repeated as Critic's, and `actions`, into values_ [columns].
+  void EvaluateSmaller(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
+                       const ConstMatrixRef<float>& actions);
+  // V(s) [n] of the observations that head_ is of.
+  void MeanValue(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations, Rng& rng,
+                 Eigen::Ref<VectorX<float>> values);
   // Draws `count` actions of each state: draw k of state j is column k * n + j of actions_.
   void Sample(Eigen::Index count, Rng& rng);
   // [1 x columns] of the critic at the observations, repeated to as many columns as `actions` has.

@@ -125,6 +125,13 @@ void DiscreteActor::Advantages(const ConstMatrixRef<float>& actions,
   }
 }
 
+void DiscreteActor::Values(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
+                           const ConstMatrixRef<float>& masks, Eigen::Ref<VectorX<float>> values) {
+  RunCategorical(policy, kPolicyNetwork, observations, masks, &view_.policy);
+  RunCritics(policy, observations);
+  values = view_.policy.cwiseProduct(view_.q).colwise().sum().transpose();
+}
+
 const PolicyView& DiscreteActor::View(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
                                       const ConstMatrixRef<float>& masks) {
   RunCategorical(policy, kPolicyNetwork, observations, masks, &view_.policy);

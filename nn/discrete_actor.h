@@ -15,6 +15,8 @@ class DiscreteActor {
   absl::Status Act(const PolicyNetworks& policy, ActingMode mode, const ConstMatrixRef<float>& observations,
                    const ConstMatrixRef<float>& masks, Rng& rng, Eigen::Ref<MatrixX<float>> actions);
   void Advantages(const ConstMatrixRef<float>& actions, Eigen::Ref<VectorX<float>> advantages) const;
+  void Values(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
+              const ConstMatrixRef<float>& masks, Eigen::Ref<VectorX<float>> values);
   const PolicyView& View(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
                          const ConstMatrixRef<float>& masks);
 

@@ -1,5 +1,7 @@
 #include "nn/policy.h"
 
+#include <limits>
+
 #include "core/check.h"
 #include "core/transition.h"
 #include "nn/continuous_actor.h"
@@ -45,6 +47,21 @@ void PolicyRunner::Advantages(const ConstMatrixRef<float>& actions, Rng& rng,
     state_->discrete.Advantages(actions, advantages);
   } else {
     state_->continuous.Advantages(*state_->policy, state_->observations, actions, rng, advantages);
+  }
+}
+
+void PolicyRunner::Values(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
+                          const ConstMatrixRef<float>& masks, Rng& rng, Eigen::Ref<VectorX<float>> values) {
+  state_->policy = nullptr;
+  if (!policy.has_critics()) {
+    values.setConstant(std::numeric_limits<float>::quiet_NaN());
+    return;
+  }
+  if (!policy.Normalize(observations, &state_->observations)) state_->observations = observations;
+  if (policy.spec().actions.discrete()) {
+    state_->discrete.Values(policy, state_->observations, masks, values);
+  } else {
+    state_->continuous.Values(policy, state_->observations, rng, values);
   }
 }
 

@@ -39,6 +39,11 @@ class PolicyRunner {
   // may be others than Act's (exploration). NaN (not yet judged) where the snapshot has no critics.
   void Advantages(const ConstMatrixRef<float>& actions, Rng& rng, Eigen::Ref<VectorX<float>> advantages);
 
+  // V(s) of n states, [n]: as in Advantages. NaN where the snapshot has no critics. Act's results are gone
+  // afterwards: Advantages needs a new one.
+  void Values(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
+              const ConstMatrixRef<float>& masks, Rng& rng, Eigen::Ref<VectorX<float>> values);
+
   // All of the networks' outputs, for probing; discrete actions alone.
   const PolicyView& View(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
                          const ConstMatrixRef<float>& masks);

@@ -22,7 +22,7 @@ absl::Status CheckWidth(const char* name, int expected, std::uint32_t found) {
   if (static_cast<std::uint32_t>(expected) == found) return absl::OkStatus();
   return absl::InvalidArgumentError(
       absl::StrCat(name, ": expected ", expected, ", found ", found,
-                   ". Writers and readers of one replay server share one environment."));
+                   ". Writers and readers of one replay server share one environment and one algorithm."));
 }
 
 void Append(absl::Span<const float> values, Column* column) {
@@ -40,19 +40,21 @@ void CopyColumn(const Column& column, Matrix* matrix) {
 
 TransitionLayout LayoutOf(const TransitionBatch& batch) {
   return {static_cast<int>(batch.observation_width()), static_cast<int>(batch.action_width()),
-          static_cast<int>(batch.mask_width())};
+          static_cast<int>(batch.mask_width()), static_cast<int>(batch.return_width())};
 }
 
 void SetLayout(const TransitionLayout& layout, TransitionBatch* batch) {
   batch->set_observation_width(layout.observation_width);
   batch->set_action_width(layout.action_width);
   batch->set_mask_width(layout.mask_width);
+  batch->set_return_width(layout.return_width);
 }
 
 absl::Status CheckShape(const TransitionBatch& batch, const TransitionLayout& layout) {
   RETURN_IF_ERROR(CheckWidth("observation_width", layout.observation_width, batch.observation_width()));
   RETURN_IF_ERROR(CheckWidth("action_width", layout.action_width, batch.action_width()));
   RETURN_IF_ERROR(CheckWidth("mask_width", layout.mask_width, batch.mask_width()));
+  RETURN_IF_ERROR(CheckWidth("return_width", layout.return_width, batch.return_width()));
   constexpr std::uint32_t kMaxRows = 1u << 24;
   if (batch.count() > kMaxRows) {
     return absl::InvalidArgumentError(
@@ -64,6 +66,7 @@ absl::Status CheckShape(const TransitionBatch& batch, const TransitionLayout& la
   RETURN_IF_ERROR(CheckColumn("masks", batch.masks(), n, layout.mask_width));
   RETURN_IF_ERROR(CheckColumn("rewards", batch.rewards(), n, 1));
   RETURN_IF_ERROR(CheckColumn("discounts", batch.discounts(), n, 1));
+  RETURN_IF_ERROR(CheckColumn("returns", batch.returns(), n, layout.return_width));
   RETURN_IF_ERROR(CheckColumn("next_observations", batch.next_observations(), n, layout.observation_width));
   RETURN_IF_ERROR(CheckColumn("next_masks", batch.next_masks(), n, layout.mask_width));
   if (!batch.advantages().empty()) RETURN_IF_ERROR(CheckColumn("advantages", batch.advantages(), n, 1));
@@ -81,6 +84,7 @@ void AppendTransition(const TransitionView& transition, float advantage, std::ui
   Append(transition.mask, batch->mutable_masks());
   batch->add_rewards(transition.reward);
   batch->add_discounts(transition.discount);
+  if (batch->return_width() > 0) batch->add_returns(transition.monte_carlo_return);
   Append(transition.next_observation, batch->mutable_next_observations());
   Append(transition.next_mask, batch->mutable_next_masks());
   batch->add_advantages(advantage);
@@ -97,7 +101,8 @@ TransitionView RowOf(const TransitionBatch& batch, int i) {
           .reward = batch.rewards(i),
           .discount = batch.discounts(i),
           .next_observation = {batch.next_observations().data() + i * observation, observation},
-          .next_mask = {batch.next_masks().data() + i * mask, mask}};
+          .next_mask = {batch.next_masks().data() + i * mask, mask},
+          .monte_carlo_return = batch.return_width() > 0 ? batch.returns(i) : kNoReturn};
 }
 
 absl::Status Decode(const TransitionBatch& batch, const TransitionLayout& layout, Batch* out) {
@@ -108,6 +113,7 @@ absl::Status Decode(const TransitionBatch& batch, const TransitionLayout& layout
   CopyColumn(batch.masks(), &out->masks);
   CopyColumn(batch.rewards(), &out->rewards);
   CopyColumn(batch.discounts(), &out->discounts);
+  CopyColumn(batch.returns(), &out->returns);
   CopyColumn(batch.next_observations(), &out->next_observations);
   CopyColumn(batch.next_masks(), &out->next_masks);
   return absl::OkStatus();

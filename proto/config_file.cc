@@ -124,6 +124,10 @@ bool TrainsOfflineAlone(const Config& config) {
   return learner.max_updates() > 0 && learner.max_updates() <= learner.offline_updates();
 }
 
+bool NeedsReturns(const AlgorithmConfig& config) {
+  return config.dbr().advantage() == DbrConfig::SIL;
+}
+
 std::vector<int> HiddenSizes(const Config& config) {
   if (config.network().hidden_sizes().empty()) return {256, 256, 256};
   return {config.network().hidden_sizes().begin(), config.network().hidden_sizes().end()};

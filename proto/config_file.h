@@ -28,6 +28,10 @@ std::string PrintConfig(const Config& config);
 // Whether all of the updates are made on the seed, so that no actor ever acts.
 bool TrainsOfflineAlone(const Config& config);
 
+// Whether transitions carry their Monte-Carlo returns (TransitionLayout::Of): DBR's advantage SIL takes R -
+// V(s).
+bool NeedsReturns(const AlgorithmConfig& config);
+
 // `hidden_sizes` or the paper's 256, 256, 256.
 std::vector<int> HiddenSizes(const Config& config);
 

@@ -17,6 +17,7 @@ struct InsertColumns {
   const float* masks = nullptr;                    // [count x mask width]
   const float* rewards = nullptr;                  // [count]
   const float* discounts = nullptr;                // [count]
+  const float* returns = nullptr;                  // [count x return width]
   const float* next_observations = nullptr;        // [count x observation width]
   const float* next_masks = nullptr;               // [count x mask width]
   const float* advantages = nullptr;               // [count], NaN: not yet judged; or null: none is judged
@@ -31,7 +32,8 @@ struct InsertColumns {
             .reward = rewards[row],
             .discount = discounts[row],
             .next_observation = {next_observations + row * observation, observation},
-            .next_mask = {next_masks + row * mask, mask}};
+            .next_mask = {next_masks + row * mask, mask},
+            .monte_carlo_return = layout.return_width > 0 ? returns[row] : kNoReturn};
   }
   float Advantage(int i) const { return advantages == nullptr ? kUnjudged : advantages[i]; }
   std::uint64_t CriticVersion(int i) const { return critic_versions == nullptr ? 0 : critic_versions[i]; }
@@ -45,6 +47,7 @@ struct DrawColumns {
   float* masks = nullptr;
   float* rewards = nullptr;
   float* discounts = nullptr;
+  float* returns = nullptr;
   float* next_observations = nullptr;
   float* next_masks = nullptr;
 };

@@ -23,7 +23,8 @@ absl::StatusOr<ReplayServerOptions> MakeOptions(const ServiceArguments& argument
       const std::unique_ptr<Env> env,
       MakeEnv({.name = config.env().name(),
                .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
-  ReplayServerOptions options = OptionsFrom(config, TransitionLayout::Of(env->spec()));
+  ReplayServerOptions options =
+      OptionsFrom(config, TransitionLayout::Of(env->spec(), NeedsReturns(config.algorithm())));
   options.store.env = env->spec().name;
   options.store.path = arguments.folder.replay_store();
   options.store.resume = arguments.resume;

@@ -159,7 +159,7 @@ absl::Status PartitionedBuffer::Insert(std::uint32_t place, InsertBatch* batch, 
 void PartitionedBuffer::DrawPart(int part, std::uint32_t count, const DrawColumns& out) {
   ChooseSlots(part, count);
   const std::size_t observation = layout_.observation_width, action = layout_.action_width,
-                    mask = layout_.mask_width;
+                    mask = layout_.mask_width, monte_carlo = layout_.return_width;
   const auto copy = [](const float* from, std::size_t width, std::size_t i, float* to) {
     if (width > 0) std::memcpy(to + i * width, from, width * sizeof(float));
   };
@@ -173,6 +173,7 @@ void PartitionedBuffer::DrawPart(int part, std::uint32_t count, const DrawColumn
     copy(row + layout_.mask_offset(), mask, i, out.masks);
     out.rewards[i] = row[layout_.reward_offset()];
     out.discounts[i] = row[layout_.discount_offset()];
+    copy(row + layout_.return_offset(), monte_carlo, i, out.returns);
     copy(row + layout_.next_observation_offset(), observation, i, out.next_observations);
     copy(row + layout_.next_mask_offset(), mask, i, out.next_masks);
   }

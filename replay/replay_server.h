@@ -23,7 +23,7 @@ struct ReplayServerOptions {
   ServerOptions server;
 };
 
-// What `config` says, for an environment of that layout; paths and address are the caller's to set. A
+// What `config` says, for transitions of that layout; paths and address are the caller's to set. A
 // tolerance of 0 becomes a tenth of capacity * samples_per_insert.
 ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& layout);
 

@@ -25,8 +25,9 @@ bool IsAction(float action, int actions) {
 bool RowIsGood(const TransitionLayout& layout, const InsertColumns& columns, int i) {
   const TransitionView row = columns.Row(layout, i);
   return AllFinite(row.observation) && AllFinite(row.action) && AllFinite(row.mask) &&
-         AllFinite({&row.reward, 1}) && AllFinite({&row.discount, 1}) && AllFinite(row.next_observation) &&
-         AllFinite(row.next_mask) && !std::isinf(columns.Advantage(i)) &&
+         AllFinite({&row.reward, 1}) && AllFinite({&row.discount, 1}) &&
+         (layout.return_width == 0 || AllFinite({&row.monte_carlo_return, 1})) &&
+         AllFinite(row.next_observation) && AllFinite(row.next_mask) && !std::isinf(columns.Advantage(i)) &&
          (layout.mask_width == 0 || IsAction(row.action[0], layout.mask_width));
 }
 
@@ -35,6 +36,7 @@ bool AllGood(const TransitionLayout& layout, const InsertColumns& c) {
   if (!AllFinite({c.observations, n * layout.observation_width}) ||
       !AllFinite({c.actions, n * layout.action_width}) || !AllFinite({c.masks, n * layout.mask_width}) ||
       !AllFinite({c.rewards, n}) || !AllFinite({c.discounts, n}) ||
+      !AllFinite({c.returns, n * layout.return_width}) ||
       !AllFinite({c.next_observations, n * layout.observation_width}) ||
       !AllFinite({c.next_masks, n * layout.mask_width})) {
     return false;

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "core/status_macros.h"
 #include "replay/dataset/dataset_reader.h"
+#include "replay/dataset/return_reader.h"
 
 namespace dbr {
 namespace {
@@ -46,6 +48,13 @@ absl::StatusOr<std::unique_ptr<DatasetReader>> OpenFitting(const SeedOptions& op
                      "for offline data has none other, found ",
                      options.env));
   }
+  if (layout.return_width > 0 && options.discount >= 1) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("algorithm.discount: expected below 1 where the returns of a seed are needed (advantage "
+                     "SIL), for those of "
+                     "episodes that were cut have no bound else, found ",
+                     options.discount));
+  }
   DatasetOptions dataset{.env = options.env,
                          .observation_size = layout.observation_width,
                          .action_width = layout.action_width,
@@ -70,6 +79,31 @@ SeedRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
           .rows_per_second = static_cast<double>(facts.transitions) / absl::ToDoubleSeconds(elapsed)};
 }
 
+// The file's rows, flat as the buffer lays them, with returns where it wants them.
+class SeedRows {
+ public:
+  // `reader` outlives this.
+  SeedRows(DatasetReader* reader, const TransitionLayout& layout, float discount) : reader_(reader) {
+    if (layout.return_width > 0) {
+      returns_.emplace(reader, discount);
+    } else {
+      chunk_.emplace(layout, PartitionedBuffer::kSeedRowsPerLock);
+    }
+  }
+
+  // Some rows; none at the end. Valid until the next call.
+  absl::StatusOr<absl::Span<const float>> Next() {
+    if (returns_.has_value()) return returns_->Next();
+    RETURN_IF_ERROR(reader_->Next(&*chunk_).status());
+    return chunk_->rows();
+  }
+
+ private:
+  DatasetReader* const reader_;
+  std::optional<ReturnReader> returns_;
+  std::optional<TransitionChunk> chunk_;
+};
+
 }  // namespace
 
 absl::Status CheckSeedFits(const SeedOptions& options, const TransitionLayout& layout,
@@ -84,15 +118,14 @@ absl::StatusOr<SeedRecord> ImportSeed(const SeedOptions& options, PartitionedBuf
   const TransitionLayout& layout = buffer->layout();
   ASSIGN_OR_RETURN(const std::unique_ptr<DatasetReader> reader,
                    OpenFitting(options, layout, buffer->capacity()));
-  TransitionChunk chunk(layout, PartitionedBuffer::kSeedRowsPerLock);
-  std::uint64_t held_already = before.seed_rows;
+  SeedRows seed(reader.get(), layout, options.discount);
+  std::uint64_t held_already = before.seed_rows * static_cast<std::uint64_t>(layout.stride());  // floats
   for (;;) {
-    ASSIGN_OR_RETURN(const int rows, reader->Next(&chunk));
-    if (rows == 0) break;
-    const std::uint64_t skipped = std::min(held_already, static_cast<std::uint64_t>(rows));
+    ASSIGN_OR_RETURN(const absl::Span<const float> rows, seed.Next());
+    if (rows.empty()) break;
+    const std::uint64_t skipped = std::min(held_already, static_cast<std::uint64_t>(rows.size()));
     held_already -= skipped;
-    RETURN_IF_ERROR(
-        buffer->InsertSeed(chunk.rows().subspan(skipped * static_cast<std::uint64_t>(layout.stride()))));
+    RETURN_IF_ERROR(buffer->InsertSeed(rows.subspan(skipped)));
   }
   // Bad rows may have been left out.
   RETURN_IF_ERROR(CheckEnough(options, static_cast<std::uint64_t>(reader->facts().transitions)));

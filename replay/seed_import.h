@@ -30,8 +30,11 @@ absl::Status CheckSeedFits(const SeedOptions& options, const TransitionLayout& l
 
 // Reads the whole file into `buffer`, all in its order, and completes its seed; goes on where an import into
 // the same store was broken off, and does nothing where the store has its seed already. Returns what the
-// buffer then knows. Errors: InvalidArgument for a seed that does not fit the capacity or the environment,
-// and all errors of DatasetReader and PartitionedBuffer::InsertSeed. Blocks: some 10^6 rows a second.
+// buffer then knows. Where the buffer's rows have a return it is computed here; behind an end that is cut or
+// unfinished the mean reward of the last min(T, 1 / (1 - discount)) steps is taken to go on for ever
+// (replay/dataset/return_reader.h). Errors: InvalidArgument for a seed that does not fit the capacity or the
+// environment, and all errors of DatasetReader and PartitionedBuffer::InsertSeed. Blocks: some 10^6 rows a
+// second.
 absl::StatusOr<SeedRecord> ImportSeed(const SeedOptions& options, PartitionedBuffer* buffer);
 
 }  // namespace dbr

@@ -34,6 +34,7 @@ DrawColumns RoomForPart(std::size_t count, const TransitionLayout& layout, Sampl
           .masks = Room(mask, batch->mutable_masks()),
           .rewards = Room(count, batch->mutable_rewards()),
           .discounts = Room(count, batch->mutable_discounts()),
+          .returns = Room(count * layout.return_width, batch->mutable_returns()),
           .next_observations = Room(observation, batch->mutable_next_observations()),
           .next_masks = Room(mask, batch->mutable_next_masks())};
 }
@@ -119,6 +120,7 @@ absl::StatusOr<InsertBatch> DecodeInsert(const InsertRequest& request, const Tra
       .masks = batch.masks().data(),
       .rewards = batch.rewards().data(),
       .discounts = batch.discounts().data(),
+      .returns = batch.returns().data(),
       .next_observations = batch.next_observations().data(),
       .next_masks = batch.next_masks().data(),
       .advantages = batch.advantages().empty() ? nullptr : batch.advantages().data(),

@@ -20,7 +20,7 @@ namespace dbr {
 namespace {
 
 constexpr char kMagic[8] = {'D', 'B', 'R', 'S', 'T', 'O', 'R', 'E'};
-constexpr std::uint32_t kFormat = 2;
+constexpr std::uint32_t kFormat = 3;
 
 struct Header {
   char magic[8];
@@ -31,6 +31,7 @@ struct Header {
   std::uint64_t capacity;
   std::uint64_t total_bytes;
   char env[64];
+  std::int32_t return_width;
   std::uint32_t crc32c;  // of all before it
 };
 static_assert(sizeof(Header) <= StoreFile::kHeaderBytes);
@@ -46,6 +47,7 @@ Header MakeHeader(const StoreShape& shape) {
   header.observation_width = shape.layout.observation_width;
   header.action_width = shape.layout.action_width;
   header.mask_width = shape.layout.mask_width;
+  header.return_width = shape.layout.return_width;
   header.capacity = shape.capacity;
   header.total_bytes = shape.total_bytes;
   std::memcpy(header.env, shape.env.data(), shape.env.size());
@@ -56,7 +58,8 @@ Header MakeHeader(const StoreShape& shape) {
 std::string Describe(const Header& header) {
   return absl::StrCat("environment '", absl::string_view(header.env, strnlen(header.env, sizeof header.env)),
                       "', widths ", header.observation_width, "/", header.action_width, "/",
-                      header.mask_width, " (observation/action/mask), capacity ", header.capacity);
+                      header.mask_width, " (observation/action/mask), ",
+                      header.return_width > 0 ? "with" : "without", " returns, capacity ", header.capacity);
 }
 
 absl::Status CheckHeader(const std::string& path, const Header& expected, const Header& found,
@@ -66,8 +69,9 @@ absl::Status CheckHeader(const std::string& path, const Header& expected, const 
         absl::StrCat("replay store ", path, ": this is no replay store, or its header is damaged"));
   }
   if (found.format != kFormat) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("replay store ", path, ": expected format ", kFormat, ", found ", found.format));
+    return absl::FailedPreconditionError(absl::StrCat(
+        "replay store ", path, ": expected format ", kFormat, ", found ", found.format,
+        ". Resume it with the version of this program that wrote it, or start in a new folder."));
   }
   if (found.crc32c != Checksum(found)) {
     return absl::DataLossError(absl::StrCat("replay store ", path,
@@ -75,7 +79,8 @@ absl::Status CheckHeader(const std::string& path, const Header& expected, const 
                                             ", found ", Checksum(found), ")"));
   }
   if (std::memcmp(&expected, &found, offsetof(Header, total_bytes)) != 0 ||
-      std::memcmp(expected.env, found.env, sizeof found.env) != 0) {
+      std::memcmp(expected.env, found.env, sizeof found.env) != 0 ||
+      expected.return_width != found.return_width) {
     return absl::FailedPreconditionError(absl::StrCat(
         "replay store ", path, " was made for another set-up: expected ", Describe(expected), "; found ",
         Describe(found), ". Resume with the run's own config, or start in a new folder."));

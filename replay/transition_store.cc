@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/types/span.h"
 #include "core/check.h"
 #include "core/status_macros.h"
 
@@ -30,11 +29,6 @@ std::size_t Aligned(std::size_t bytes) {
 std::uint64_t MachineMemory() {
   return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
          static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
-}
-
-float* CopyTo(float* out, absl::Span<const float> values) {
-  std::copy(values.begin(), values.end(), out);
-  return out + values.size();
 }
 
 // Rows that `options` allow, or why they make no sense. A row needs `row_bytes`, indices included.
@@ -172,15 +166,7 @@ std::uint32_t TransitionStore::Write(const RowLabels& labels, const Fill& fill) 
 }
 
 std::uint32_t TransitionStore::Append(const TransitionView& transition, const RowLabels& labels) {
-  return Write(labels, [&transition](float* out) {
-    out = CopyTo(out, transition.observation);
-    out = CopyTo(out, transition.action);
-    out = CopyTo(out, transition.mask);
-    *out++ = transition.reward;
-    *out++ = transition.discount;
-    out = CopyTo(out, transition.next_observation);
-    CopyTo(out, transition.next_mask);
-  });
+  return Write(labels, [&transition, this](float* out) { WriteRow(transition, layout_, out); });
 }
 
 std::uint32_t TransitionStore::AppendSeed(const float* row, const RowLabels& labels) {

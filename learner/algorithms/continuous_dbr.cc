@@ -1,6 +1,7 @@
 #include "learner/algorithms/continuous_dbr.h"
 
 #include "learner/algorithms/algorithm_adapter.h"
+#include "learner/parts/munchausen.h"
 
 namespace dbr {
 
@@ -19,15 +20,25 @@ template <class Scalar>
 absl::Status ContinuousDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                                            const BasicBatch<Scalar>& minus) {
   networks_.Begin(spec_.config);
-  networks_.runner.Run([&] { beta_plus_.Fit(plus, nullptr, &networks_.beta_plus); },
-                       [&] { beta_minus_.Fit(minus, nullptr, &networks_.beta_minus); });
+  FitBehaviors(plus, minus);
   ComputeNextValue(uniform);
-  const Scalar critic_loss =
-      regression_.Fit(uniform, spec_.config.reward_scale(), next_value_, &networks_.critics);
+  EvaluateBehaviors(uniform);
+  const Scalar critic_loss = regression_.Fit(uniform, spec_.config.reward_scale(), next_value_,
+                                             &networks_.critics, RewardBonus(uniform));
   const PolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
+  JudgeAndImitate(uniform);
   networks_.Finish(spec_.config, policy_loss);
   return networks_.Report({critic_loss, beta_plus_.loss(), beta_minus_.loss()}, policy_loss,
                           regression_.target().mean(), advantages_, &metrics_);
+}
+
+template <class Scalar>
+void ContinuousDbr<Scalar>::FitBehaviors(const BasicBatch<Scalar>& plus, const BasicBatch<Scalar>& minus) {
+  networks_.runner.Run(
+      [&] {
+        if (!ImitatesItself(spec_.config.dbr())) beta_plus_.Fit(plus, nullptr, &networks_.beta_plus);
+      },
+      [&] { beta_minus_.Fit(minus, nullptr, &networks_.beta_minus); });
 }
 
 template <class Scalar>
@@ -38,12 +49,27 @@ void ContinuousDbr<Scalar>::ComputeNextValue(const BasicBatch<Scalar>& batch) {
   next_value_ =
       next_.Compute(batch.next_observations, next_noise_, static_cast<Scalar>(config.target_min_weight()),
                     &networks_.policy, &networks_.critics);
-  if (config.value_penalty()) {
+  if (config.value_penalty() && networks_.constrained) {
     DrawDivergenceNoise(n);
     penalty_.Compute({options_.divergence, options_.mmd_sigma}, next_.pi(),
                      beta_plus_.At(batch.next_observations, &networks_.beta_plus), {noise_.pi, noise_.plus});
-    next_value_ -= networks_.multiplier.value() * penalty_.value();
+    next_value_ -= networks_.alpha() * penalty_.value();
   }
+}
+
+template <class Scalar>
+void ContinuousDbr<Scalar>::EvaluateBehaviors(const BasicBatch<Scalar>& batch) {
+  networks_.runner.Run([&] { beta_plus_.At(batch.observations, &networks_.beta_plus); },
+                       [&] { beta_minus_.At(batch.observations, &networks_.beta_minus); });
+}
+
+template <class Scalar>
+const VectorX<Scalar>* ContinuousDbr<Scalar>::RewardBonus(const BasicBatch<Scalar>& batch) {
+  const double weight = spec_.config.dbr().munchausen_weight();
+  if (weight == 0) return nullptr;
+  TanhLogProb<Scalar>(beta_plus_.head().view(), batch.actions, &log_prob_, nullptr);
+  MunchausenBonus<Scalar>(weight, log_prob_, &bonus_);
+  return &bonus_;
 }
 
 template <class Scalar>
@@ -59,22 +85,32 @@ template <class Scalar>
 PolicyLoss<Scalar> ContinuousDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
   const DbrConfig& config = spec_.config.dbr();
   const Eigen::Index n = batch.size();
-  networks_.runner.Run([&] { beta_plus_.At(batch.observations, &networks_.beta_plus); },
-                       [&] { beta_minus_.At(batch.observations, &networks_.beta_minus); });
   pi_.Split(networks_.policy.Forward(batch.observations), kPolicyLogStd);
   FillNormal(rng_, spec_.actions.size, config.policy_samples() * n, &noise_.actions);
   DrawDivergenceNoise(n);
   options_.use_q = networks_.updates >= config.warm_start_updates();
   const PolicyLoss<Scalar> loss =
       objective_.Compute(options_, {pi_, beta_plus_.head(), beta_minus_.head()}, batch.observations, noise_,
-                         networks_.multiplier.value(), &networks_.critics, &d_output_);
+                         networks_.alpha(), &networks_.critics, &d_output_);
   networks_.policy.Step(batch.observations, d_output_);
   value_.resize(n);
   objective_.StateValue(networks_.critics, &value_);
-  advantages_.resize(static_cast<std::size_t>(n));
-  Eigen::Map<Eigen::VectorXf>(advantages_.data(), n) =
-      (regression_.behavior_value() - value_).template cast<float>();
   return loss;
+}
+
+template <class Scalar>
+void ContinuousDbr<Scalar>::JudgeAndImitate(const BasicBatch<Scalar>& batch) {
+  const Eigen::Index n = batch.size();
+  advantage_.resize(n);
+  if (ImitatesItself(spec_.config.dbr())) {
+    imitation_.Judge(batch, spec_.config.reward_scale(), value_);
+    advantage_ = imitation_.advantage();
+    if (imitation_.imitates()) beta_plus_.Fit(batch, &imitation_.weights(), &networks_.beta_plus);
+  } else {
+    advantage_ = regression_.behavior_value() - value_;
+  }
+  advantages_.resize(static_cast<std::size_t>(n));
+  Eigen::Map<Eigen::VectorXf>(advantages_.data(), n) = advantage_.template cast<float>();
 }
 
 template <class Scalar>
@@ -84,7 +120,7 @@ double ContinuousDbr<Scalar>::UpdateFlops() const {
   const TwinCritic<Scalar>& critics = networks_.critics;
   return critics.TargetFlops(n * config.target_samples()) + critics.FitFlops(n) +
          critics.InputGradientFlops(n * config.policy_samples()) +
-         networks_.PolicyFlops(needs_, config.value_penalty() ? 2 : 1);
+         networks_.PolicyFlops(needs_, config.value_penalty() && networks_.constrained ? 2 : 1);
 }
 
 template <class Scalar>

@@ -11,6 +11,7 @@
 #include "learner/parts/dual_behavior_objective.h"
 #include "learner/parts/gaussian_likelihood.h"
 #include "learner/parts/greatest_target.h"
+#include "learner/parts/self_imitation.h"
 
 namespace dbr {
 
@@ -26,6 +27,15 @@ namespace dbr {
 //   4. alpha ascends on alpha * (D(pi, beta+) - c).
 //   5. Polyak averaging of the critics and of pi.
 //   6. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin, V its mean over the draws of step 3.
+//
+// With advantage SIL (the paper's section "ARM and SIL"; Oh et al. 2018) step 6 takes A = reward_scale * R -
+// V(s), R the Monte-Carlo return, and beta+ is not fitted to B+ but after step 6, in a step of its own, to B:
+// it maximises the mean of w log beta+(a|s), w = max(A, 0) divided by its mean over B (skipped where all are
+// 0). The critics take no part in it.
+// With munchausen_weight w the r of step 2 is r + w * log beta+(a|s), the log clipped to [-1, 0], before it
+// is scaled (the paper's section on ablations), beta+ being that of step 1.
+// With constraint NONE step 3 has no second term, and there is no step 4.
+//
 // Departures: step 6 takes Q(s, a) from before step 2's gradient step, so that nothing is computed twice.
 template <class Scalar>
 class ContinuousDbr {
@@ -44,9 +54,16 @@ class ContinuousDbr {
   absl::Status Load(const TensorFile& file);
 
  private:
+  void FitBehaviors(const BasicBatch<Scalar>& plus, const BasicBatch<Scalar>& minus);
   // V'(s') [n] into next_value_.
   void ComputeNextValue(const BasicBatch<Scalar>& batch);
+  // beta+ and beta- at the batch's states.
+  void EvaluateBehaviors(const BasicBatch<Scalar>& batch);
+  // After EvaluateBehaviors: what rewards are raised by [n], or null.
+  const VectorX<Scalar>* RewardBonus(const BasicBatch<Scalar>& batch);
   PolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
+  // After ImprovePolicy: the advantages, and self-imitation's fit.
+  void JudgeAndImitate(const BasicBatch<Scalar>& batch);
   void DrawDivergenceNoise(Eigen::Index n);
 
   AlgorithmSpec spec_;
@@ -64,7 +81,8 @@ class ContinuousDbr {
   GaussianDivergence<Scalar> penalty_;
   ObjectiveNoise<Scalar> noise_;
   MatrixX<Scalar> next_noise_, d_output_;
-  VectorX<Scalar> next_value_, value_;
+  VectorX<Scalar> next_value_, value_, advantage_, log_prob_, bonus_;
+  SelfImitation<Scalar> imitation_;
   std::vector<float> advantages_;
   std::vector<UpdateMetric> metrics_;
 };

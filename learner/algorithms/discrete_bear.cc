@@ -19,7 +19,7 @@ template <class Scalar>
 absl::Status DiscreteBear<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
                                           const BasicBatch<Scalar>&) {
   behavior_.set_learning_rate(networks_.Begin(spec_.config));
-  networks_.runner.Run([&] { beta_.Fit(uniform, &behavior_); },
+  networks_.runner.Run([&] { beta_.Fit(uniform, nullptr, &behavior_); },
                        [&] {
                          MaskedSoftmax<Scalar>(networks_.policy.ForwardTarget(uniform.next_observations),
                                                uniform.next_masks, &next_pi_);

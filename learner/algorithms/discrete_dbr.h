@@ -8,6 +8,7 @@
 #include "learner/parts/categorical_likelihood.h"
 #include "learner/parts/discrete_losses.h"
 #include "learner/parts/dual_behavior_networks.h"
+#include "learner/parts/self_imitation.h"
 
 namespace dbr {
 
@@ -26,6 +27,15 @@ namespace dbr {
 //   4. alpha ascends on alpha * (D(pi, beta+) - c).
 //   5. Polyak averaging of the critics and of pi.
 //   6. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin, V its expectation under pi.
+//
+// With advantage SIL (the paper's section "ARM and SIL"; Oh et al. 2018) step 6 takes A = reward_scale * R -
+// V(s), R the Monte-Carlo return, and beta+ is not fitted to B+ but after step 6, in a step of its own, to B:
+// it maximises the mean of w log beta+(a|s), w = max(A, 0) divided by its mean over B (skipped where all are
+// 0). The critics take no part in it.
+// With munchausen_weight w the r of step 2 is r + w * log beta+(a|s), the log clipped to [-1, 0], before it
+// is scaled (the paper's section on ablations), beta+ being that of step 1.
+// With constraint NONE step 3 has no second term, and there is no step 4.
+//
 // Departures: steps 3 and 6 use the critics' values from before step 2's gradient step, and step 6 the
 // policy's from before step 3's, so that nothing is computed twice. entropy_weight adds the entropy term of
 // discrete SAC to step 3.
@@ -46,8 +56,15 @@ class DiscreteDbr {
   absl::Status Load(const TensorFile& file);
 
  private:
+  void FitBehaviors(const BasicBatch<Scalar>& plus, const BasicBatch<Scalar>& minus);
   void ComputeTargets(const BasicBatch<Scalar>& batch);
+  // beta+ and beta- at the batch's states.
+  void EvaluateBehaviors(const BasicBatch<Scalar>& batch);
+  // After EvaluateBehaviors: the Munchausen term, into target_.
+  void RaiseRewards(const BasicBatch<Scalar>& batch);
   PolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
+  // After ImprovePolicy: the advantages, and self-imitation's fit.
+  void JudgeAndImitate(const BasicBatch<Scalar>& batch);
 
   AlgorithmSpec spec_;
   BatchNeeds needs_;
@@ -59,7 +76,8 @@ class DiscreteDbr {
   CategoricalLikelihood<Scalar> beta_plus_, beta_minus_;
   Categorical<Scalar> pi_, next_pi_;
   PolicyLossWorkspace<Scalar> workspace_;
-  VectorX<Scalar> target_, penalty_, value_;
+  VectorX<Scalar> target_, penalty_, log_prob_, bonus_, value_;
+  SelfImitation<Scalar> imitation_;
   MatrixX<Scalar> d_logits_;
   std::vector<float> advantages_;
   std::vector<UpdateMetric> metrics_;

@@ -95,6 +95,7 @@ class NormalizedAlgorithm final : public Algorithm {
     normalized->masks = batch.masks;
     normalized->rewards = batch.rewards;
     normalized->discounts = batch.discounts;
+    normalized->returns = batch.returns;
     normalized->next_masks = batch.next_masks;
     normalized->keys = batch.keys;
     if (batch.size() == 0) {

@@ -11,12 +11,12 @@ namespace dbr {
 template <class Scalar>
 class CategoricalLikelihood {
  public:
-  // One step on the mean over the batch of -log p(a|s). Keeps the loss and the distribution from before the
-  // step, and does nothing on an empty batch.
-  void Fit(const BasicBatch<Scalar>& batch, TrainedNetwork<Scalar>* network) {
+  // One step on the mean over the batch of -w log p(a|s); weights [n] are constants, null: all 1. Keeps the
+  // loss and the distribution from before the step, and does nothing on an empty batch.
+  void Fit(const BasicBatch<Scalar>& batch, const VectorX<Scalar>* weights, TrainedNetwork<Scalar>* network) {
     if (batch.size() == 0) return;
     MaskedSoftmax<Scalar>(network->Forward(batch.observations), batch.masks, &distribution_);
-    loss_ = NegativeLogLikelihood<Scalar>(distribution_, batch.actions, &d_logits_);
+    loss_ = NegativeLogLikelihood<Scalar>(distribution_, batch.actions, &d_logits_, weights);
     network->Step(batch.observations, d_logits_);
   }
 

@@ -13,10 +13,12 @@ template <class Scalar>
 class CriticRegression {
  public:
   // One step of both critics on the mean of (Q_i(s, a) - y)^2, y = reward_scale * r + discount * V'(s') a
-  // constant. next_value [n] is V'(s'). Gives the two losses' mean.
+  // constant. next_value [n] is V'(s'). With `bonus` [n] the rewards are r + bonus. Gives the two losses'
+  // mean.
   Scalar Fit(const BasicBatch<Scalar>& batch, double reward_scale, const VectorX<Scalar>& next_value,
-             TwinCritic<Scalar>* critics) {
+             TwinCritic<Scalar>* critics, const VectorX<Scalar>* bonus = nullptr) {
     CriticTarget(batch, reward_scale, next_value, &target_);
+    if (bonus != nullptr) target_ += static_cast<Scalar>(reward_scale) * *bonus;
     inputs_.resize(batch.observations.rows() + batch.actions.rows(), batch.size());
     inputs_ << batch.observations, batch.actions;
     const Scalar loss = critics->Fit(inputs_, [&](const MatrixX<Scalar>& q, MatrixX<Scalar>* d_q) {

@@ -7,12 +7,17 @@
 
 namespace dbr {
 
+// Whether beta+ is fitted to what did better than V(s), in a step of its own, and not to D+.
+inline bool ImitatesItself(const DbrConfig& config) {
+  return config.advantage() == DbrConfig::SIL;
+}
+
 // B from D for the critics and the policy, B+ and B- for the behaviour policies.
 inline BatchNeeds DualBehaviorNeeds(const AlgorithmConfig& config) {
   const int batch = static_cast<int>(config.batch_size());
   const int behavior =
       config.dbr().behavior_batch_size() > 0 ? static_cast<int>(config.dbr().behavior_batch_size()) : batch;
-  return {.uniform = batch, .plus = behavior, .minus = behavior};
+  return {.uniform = batch, .plus = ImitatesItself(config.dbr()) ? 0 : behavior, .minus = behavior};
 }
 
 struct PolicyLossOptions {
@@ -61,7 +66,7 @@ struct PolicyLoss {
   Scalar value = 0;             // E[min_i E_pi Q_i(s, a)]
   Scalar divergence_plus = 0;   // mean D(pi, beta+)
   Scalar divergence_minus = 0;  // mean D(pi, beta-)
-  Scalar threshold = 0;         // c
+  Scalar threshold = 0;         // c; 0 without a constraint
   Scalar entropy = 0;           // mean, nats
 };
 
@@ -72,11 +77,12 @@ struct Threshold {
 };
 
 // c of D(pi, beta+) <= c for the batch's mean divergence from beta-: max(eps, D-) as the paper prints it, or
-// min(eps, D-), or eps alone (docs/algorithms.md, DBR step 3).
+// min(eps, D-), or eps alone (docs/algorithms.md, DBR step 3). Without a constraint 0, which nothing reads.
 template <class Scalar>
 Threshold<Scalar> ThresholdOf(DbrConfig::Constraint constraint, Scalar epsilon, Scalar divergence_minus) {
   const bool moved = (constraint == DbrConfig::DYNAMIC_MAX && divergence_minus > epsilon) ||
                      (constraint == DbrConfig::DYNAMIC_MIN && divergence_minus < epsilon);
+  if (constraint == DbrConfig::NONE) return {};
   return {moved ? divergence_minus : epsilon, moved};
 }
 

@@ -37,7 +37,11 @@ struct DualBehaviorNetworks {
         critics(critic_shape, spec.config.learning_rate(), rng, &runner),
         beta_plus(policy_shape, spec.config.learning_rate(), /*with_target=*/false, rng),
         beta_minus(policy_shape, spec.config.learning_rate(), /*with_target=*/false, rng),
-        multiplier(spec.config.dbr().first_multiplier(), spec.config.dbr().multiplier_learning_rate()) {}
+        multiplier(spec.config.dbr().first_multiplier(), spec.config.dbr().multiplier_learning_rate()),
+        constrained(spec.config.dbr().constraint() != DbrConfig::NONE) {}
+
+  // The multiplier of the divergence; 0 where there is no constraint.
+  Scalar alpha() const { return constrained ? multiplier.value() : Scalar{0}; }
 
   // Sets the learning rate of this update.
   void Begin(const AlgorithmConfig& config) {
@@ -50,7 +54,7 @@ struct DualBehaviorNetworks {
 
   // The multiplier's step, and the targets'.
   void Finish(const AlgorithmConfig& config, const PolicyLoss<Scalar>& loss) {
-    multiplier.Step(loss.divergence_plus - loss.threshold);
+    if (constrained) multiplier.Step(loss.divergence_plus - loss.threshold);
     critics.UpdateTargets(config.target_tau());
     policy.UpdateTarget(config.target_tau());
     ++updates;
@@ -63,6 +67,8 @@ struct DualBehaviorNetworks {
     for (const int behavior : {needs.plus, needs.minus}) {
       flops += shape.ForwardFlops(behavior) + shape.ParameterGradientFlops(behavior);
     }
+    // Self-imitation fits beta+ to B, where it was evaluated already.
+    if (needs.plus == 0) flops += shape.ParameterGradientFlops(needs.uniform);
     const int forward = 3 + next_policies;  // pi, beta+ and beta- at s
     return flops + forward * shape.ForwardFlops(needs.uniform) + shape.ParameterGradientFlops(needs.uniform);
   }
@@ -80,8 +86,8 @@ struct DualBehaviorNetworks {
                       const std::vector<float>& advantages, std::vector<UpdateMetric>* metrics) const {
     const AdvantageFigures figures = FiguresOf(advantages);
     return SetMetrics({fits.critic, loss.loss, fits.beta_plus, fits.beta_minus, loss.divergence_plus,
-                       loss.divergence_minus, loss.threshold, multiplier.value(), loss.entropy, loss.value,
-                       target_mean, figures.mean, figures.positive, figures.deviation},
+                       loss.divergence_minus, loss.threshold, alpha(), loss.entropy, loss.value, target_mean,
+                       figures.mean, figures.positive, figures.deviation},
                       updates, metrics);
   }
 
@@ -119,6 +125,7 @@ struct DualBehaviorNetworks {
   TrainedNetwork<Scalar> beta_plus;
   TrainedNetwork<Scalar> beta_minus;
   Multiplier<Scalar> multiplier;
+  const bool constrained;
   std::uint64_t updates = 0;
 };
 

@@ -35,6 +35,7 @@ void DualBehaviorObjective<Scalar>::AddConstraint(const PolicyLossOptions& optio
   const Threshold<Scalar> threshold =
       ThresholdOf(options.constraint, static_cast<Scalar>(options.epsilon), result->divergence_minus);
   result->threshold = threshold.value;
+  if (options.constraint == DbrConfig::NONE) return;
   result->loss += alpha * (result->divergence_plus - threshold.value);
   const Scalar weight = alpha / static_cast<Scalar>(heads.pi.mean().cols());
   plus_.AddGradient(weight, &gradient_);

@@ -29,9 +29,9 @@ template <class Scalar>
 class DualBehaviorObjective {
  public:
   // -E[min_i mean_k Q_i(s, a_k)] / scale - w H(pi) + alpha * (D(pi, beta+) - c), a_k drawn from pi, c by
-  // options.constraint (docs/algorithms.md, DBR step 3), and its gradient with respect to the output of pi's
-  // network [2 * dimensions x n]. beta+, beta-, the critics' weights and the scale of normalize_q are
-  // constants; so is c unless repel_negative. The entropy is that of the draws.
+  // options.constraint (docs/algorithms.md, DBR step 3; NONE leaves that term out), and its gradient with
+  // respect to the output of pi's network [2 * dimensions x n]. beta+, beta-, the critics' weights and the
+  // scale of normalize_q are constants; so is c unless repel_negative. The entropy is that of the draws.
   PolicyLoss<Scalar> Compute(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
                              const MatrixX<Scalar>& observations, const ObjectiveNoise<Scalar>& noise,
                              Scalar alpha, TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output);

@@ -3,10 +3,12 @@
 
 #include <cmath>
 #include <functional>
+#include <map>
 #include <thread>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "proto/config_file.h"
 #include "replay/client.h"
 #include "replay/replay_server.h"
 #include "tests/actor/learner_double.h"
@@ -61,7 +63,8 @@ class ActorTest : public ::testing::Test {
   }
 
   std::unique_ptr<ReplayServer> StartReplay(const EnvSpec& env, bool resume = false) const {
-    ReplayServerOptions options = OptionsFrom(config_, TransitionLayout::Of(env));
+    ReplayServerOptions options =
+        OptionsFrom(config_, TransitionLayout::Of(env, NeedsReturns(config_.algorithm())));
     options.store.path = folder_.path() + "/replay.store";
     options.store.env = env.name;
     options.store.resume = resume;
@@ -175,6 +178,84 @@ TEST_F(ActorTest, WritesUntilItIsStoppedAndLeavesNothingBehind) {
   EXPECT_EQ(stats.writers[0].identity.name, "actor-3");
   EXPECT_EQ(stats.unjudged, 0);
   EXPECT_NEAR(stats.recent_return_mean, 2 * stats.recent_score_mean - 1, 1e-9);
+}
+
+// Connect-4 pays at the end alone, and an episode has at most 21 moves of the agent's.
+TEST_F(ActorTest, TransitionsArriveWithTheirReturnsWhereTheAdvantageIsTheirs) {
+  config_.mutable_algorithm()->mutable_dbr()->set_advantage(DbrConfig::SIL);
+  config_.mutable_algorithm()->set_discount(0.5);
+  const auto server = StartReplay(Connect4Spec());
+  LearnerDouble learner(learner_address_);
+  learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
+  const auto actor = MakeActor();
+  RunningActor running(actor.get());
+  DrawnBatches drawn;
+  const TransitionLayout layout = TransitionLayout::Of(Connect4Spec(), /*with_returns=*/true);
+  const absl::Status sampled = client_->Sample({.uniform = kDrawn}, layout, kLong, &drawn);
+  ASSERT_TRUE(sampled.ok()) << sampled;
+  EXPECT_EQ(drawn.unjudged_size, 0u);
+  int paid = 0;
+  for (int i = 0; i < kDrawn; ++i) {
+    const float value = drawn.uniform.returns[i];
+    if (drawn.uniform.discounts[i] == 0) {
+      ASSERT_EQ(value, drawn.uniform.rewards[i]);
+    } else if (value != 0) {
+      const float moves = -std::log2(std::abs(value));  // to the last one
+      ASSERT_EQ(moves, std::round(moves));
+      ASSERT_TRUE(moves >= 1 && moves <= 20) << value;
+      ++paid;
+    }
+  }
+  EXPECT_GT(paid, kDrawn / 10);
+  const absl::Status status = running.Stop(
+      [&] { client_->Sample({.uniform = kDrawn}, layout, absl::Seconds(1), &drawn).IgnoreError(); });
+  EXPECT_TRUE(status.ok()) << status;
+  ExpectEachOnce(server->buffer().Stats(), actor->counters().appended);
+}
+
+// What the whole way from a step to a draw makes of an episode, cut ones too, over a real socket.
+TEST_F(ActorTest, ADrawnReturnIsThatOfItsEpisode) {
+  const EnvSpec env = LineEnv().spec();
+  config_.mutable_algorithm()->mutable_dbr()->set_advantage(DbrConfig::SIL);
+  config_.mutable_replay()->set_samples_per_insert(0);
+  const auto server = StartReplay(env);
+  const TransitionLayout layout = TransitionLayout::Of(env, /*with_returns=*/true);
+  TransitionWriter writer({.address = replay_address_, .name = "actor-0", .layout = layout});
+  StepLoop loop(MakeLines(10), {.discount = 0.9, .with_returns = true}, Rng(1),
+                [&](const TransitionView& transition, float advantage, std::uint64_t version,
+                    const std::optional<EpisodeEnd>& end) {
+                  return writer.Append(transition, advantage, version, end, kLong);
+                });
+  const auto policy = UntrainedPolicy(env, 1);
+  for (int step = 0; step < 100; ++step) ASSERT_TRUE(loop.Step(*policy).ok());
+  ASSERT_TRUE(writer.Flush(kLong).ok());
+  DrawnBatches drawn;
+  ASSERT_TRUE(client_->Sample({.uniform = 5000}, layout, kLong, &drawn).ok());
+  EXPECT_EQ(drawn.total_size + loop.held_back(), 1000u);
+  // Keys follow the order in which rows came in: an episode's are neighbours.
+  std::map<std::uint64_t, int> column_of;
+  const Batch& rows = drawn.uniform;
+  for (int i = 0; i < rows.size(); ++i) column_of[rows.keys[i]] = i;
+  int compared = 0, cut = 0;
+  for (const auto& [key, i] : column_of) {
+    const auto seed = static_cast<std::uint64_t>(rows.observations(0, i));
+    const bool last = rows.observations(1, i) + 1 == static_cast<float>(LineEnv::LengthOf(seed));
+    double behind = 0;
+    if (last && LineEnv::IsCut(seed)) {
+      PolicyRunner runner;
+      const PolicyView& view = runner.View(*policy, rows.next_observations.col(i), rows.next_masks.col(i));
+      behind = view.policy.col(0).dot(view.q.col(0));
+      ++cut;
+    } else if (!last) {
+      const auto next = column_of.find(key + 1);
+      if (next == column_of.end()) continue;
+      behind = rows.returns[next->second];
+    }
+    EXPECT_NEAR(rows.returns[i], rows.rewards[i] + rows.discounts[i] * behind, 1e-4);
+    ++compared;
+  }
+  EXPECT_GT(compared, 800);
+  EXPECT_GT(cut, 50);
 }
 
 TEST_F(ActorTest, GoesOnWhenTheLearnerAndTheReplayServerGoAwayAndComeBack) {

@@ -19,7 +19,7 @@ constexpr int kSteps = 40;
 // A transition as the sink saw it.
 struct Seen {
   Floats observation, action, mask, next_observation, next_mask;
-  float reward, discount, advantage;
+  float reward, discount, monte_carlo_return, advantage;
   std::uint64_t critic_version;
   std::optional<EpisodeEnd> end;
 
@@ -35,7 +35,7 @@ TransitionSink Into(std::vector<Seen>* seen) {
   return [seen](const TransitionView& t, float advantage, std::uint64_t version,
                 const std::optional<EpisodeEnd>& end) {
     seen->push_back({Copy(t.observation), Copy(t.action), Copy(t.mask), Copy(t.next_observation),
-                     Copy(t.next_mask), t.reward, t.discount, advantage, version, end});
+                     Copy(t.next_mask), t.reward, t.discount, t.monte_carlo_return, advantage, version, end});
     return absl::OkStatus();
   };
 }
@@ -155,6 +155,45 @@ TEST(StepLoopTest, JudgesTheActionThatWasTakenByThePushedCritics) {
     }
     EXPECT_EQ(loop.counters().explored, epsilon > 0 ? 3 * kEnvs : 0);
   }
+}
+
+// V(s) by the networks' own outputs.
+float ValueOf(const PolicyNetworks& policy, const Floats& observation, const Floats& mask) {
+  PolicyRunner runner;
+  const PolicyView& view = runner.View(policy, Eigen::Map<const VectorX<float>>(observation.data(), 2),
+                                       Eigen::Map<const VectorX<float>>(mask.data(), 3));
+  return view.policy.col(0).dot(view.q.col(0));
+}
+
+TEST(StepLoopTest, WithReturnsEpisodesGoOutWholeAndBootstrapByTheCriticWhereTheyAreCut) {
+  constexpr double kDiscount = 0.8, kScale = 2;
+  const auto policy = UntrainedPolicy(LineEnv().spec(), 5);
+  std::vector<Seen> seen;
+  StepLoop loop(MakeLines(kEnvs), {.discount = kDiscount, .with_returns = true, .reward_scale = kScale},
+                Rng(1), Into(&seen));
+  for (int step = 0; step < kSteps; ++step) ASSERT_TRUE(loop.Step(*policy).ok());
+  EXPECT_EQ(loop.counters().transitions, seen.size() + loop.held_back());
+  EXPECT_LE(loop.held_back(), static_cast<std::uint64_t>(kEnvs * LineEnv().spec().max_episode_steps));
+  int terminated = 0, cut = 0;
+  std::size_t first = 0;
+  for (std::size_t last = 0; last < seen.size(); ++last) {
+    if (!seen[last].end.has_value()) continue;
+    ASSERT_EQ(seen[last].end->length, static_cast<int>(last - first) + 1);
+    const bool ends = !LineEnv::IsCut(static_cast<std::uint64_t>(seen[last].seed()));
+    ++(ends ? terminated : cut);
+    double value = ends ? 0 : ValueOf(*policy, seen[last].next_observation, seen[last].next_mask) / kScale;
+    for (std::size_t t = last + 1; t-- > first;) {
+      EXPECT_EQ(seen[t].step(), static_cast<float>(t - first));
+      value = seen[t].reward + kDiscount * value;
+      EXPECT_NEAR(seen[t].monte_carlo_return, value, 1e-4);
+      EXPECT_NEAR(seen[t].advantage, kScale * value - ValueOf(*policy, seen[t].observation, seen[t].mask),
+                  1e-3);
+    }
+    first = last + 1;
+  }
+  EXPECT_EQ(first, seen.size());
+  EXPECT_GT(terminated, 5);
+  EXPECT_GT(cut, 5);
 }
 
 TEST(StepLoopTest, WithoutCriticsTransitionsAreNotYetJudged) {

@@ -35,7 +35,48 @@ AlgorithmSpec SpecOf(const AlgorithmId& id, std::uint64_t seed = 1) {
   return spec;
 }
 
-class Conformance : public testing::TestWithParam<AlgorithmId> {
+// An algorithm with its defaults, or one of its variants.
+struct Member {
+  AlgorithmId id;
+  std::string variant;  // of kVariants; empty: none
+};
+
+struct Variant {
+  const char* name;
+  const char* algorithm;
+  void (*set)(AlgorithmConfig* config);
+};
+
+constexpr Variant kVariants[] = {
+    {"Sil", "dbr", [](AlgorithmConfig* config) { config->mutable_dbr()->set_advantage(DbrConfig::SIL); }},
+    {"Mrl", "dbr",
+     [](AlgorithmConfig* config) {
+       config->mutable_dbr()->set_constraint(DbrConfig::NONE);
+       config->mutable_dbr()->set_munchausen_weight(0.9);
+       config->mutable_dbr()->set_entropy_weight(0.1);
+     }},
+};
+
+AlgorithmSpec SpecOf(const Member& member, std::uint64_t seed = 1) {
+  AlgorithmSpec spec = SpecOf(member.id, seed);
+  for (const Variant& variant : kVariants) {
+    if (member.variant == variant.name) variant.set(&spec.config);
+  }
+  return spec;
+}
+
+std::vector<Member> Members() {
+  std::vector<Member> members;
+  for (const AlgorithmId& id : Algorithms()) {
+    members.push_back({id, ""});
+    for (const Variant& variant : kVariants) {
+      if (id.name == variant.algorithm) members.push_back({id, variant.name});
+    }
+  }
+  return members;
+}
+
+class Conformance : public testing::TestWithParam<Member> {
  protected:
   Conformance() { algorithm_ = Make(1); }
 
@@ -181,8 +222,9 @@ TEST_P(Conformance, TwoThreadsGiveWhatOneGives) {
   EXPECT_EQ(states[0].tensors, states[1].tensors);
 }
 
-INSTANTIATE_TEST_SUITE_P(Registry, Conformance, testing::ValuesIn(Algorithms()), [](const auto& info) {
-  return info.param.name + (info.param.actions == ActionKind::kDiscrete ? "Discrete" : "Continuous");
+INSTANTIATE_TEST_SUITE_P(Registry, Conformance, testing::ValuesIn(Members()), [](const auto& info) {
+  const AlgorithmId& id = info.param.id;
+  return id.name + (id.actions == ActionKind::kDiscrete ? "Discrete" : "Continuous") + info.param.variant;
 });
 
 TEST(Registry, RefusesAnActionSpaceThatTheAlgorithmDoesNotServe) {

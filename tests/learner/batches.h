@@ -19,11 +19,13 @@ inline AlgorithmSpec SmallSpec(std::uint64_t seed = 1, ActionKind actions = Acti
   return spec;
 }
 
-// Random transitions; of a discrete space action 2 is illegal in every third state.
+// Random transitions, with returns where the algorithm takes them; of a discrete space action 2 is illegal in
+// every third state.
 template <class Scalar>
 BasicBatch<Scalar> RandomBatch(const AlgorithmSpec& spec, int n, Rng& rng) {
   BasicBatch<Scalar> batch;
-  batch.Resize({spec.observation_size, spec.actions.width(), spec.actions.mask_width()}, n,
+  const int returns = spec.config.dbr().advantage() == DbrConfig::SIL ? 1 : 0;
+  batch.Resize({spec.observation_size, spec.actions.width(), spec.actions.mask_width(), returns}, n,
                /*with_keys=*/true);
   const auto draw = [&](Scalar) { return static_cast<Scalar>(2 * rng.Uniform() - 1); };
   batch.observations = batch.observations.unaryExpr(draw).eval();
@@ -40,6 +42,8 @@ BasicBatch<Scalar> RandomBatch(const AlgorithmSpec& spec, int n, Rng& rng) {
     if (restricted) batch.masks(2, j) = batch.next_masks(2, j) = 0;
     batch.actions(0, j) = static_cast<Scalar>(rng.Below(restricted ? 2 : 3));
   }
+  // Last, so that the rest is the same with and without them.
+  for (Scalar& value : batch.returns) value = static_cast<Scalar>(3 * rng.Uniform() - 1);
   return batch;
 }
 

@@ -170,6 +170,9 @@ class ObjectiveTest : public testing::TestWithParam<Case> {
     Matrix unused;
     const PolicyLoss<double> moved = Loss(output, &unused);
     const bool repels = options_.repel_negative && at.threshold != options_.epsilon;
+    if (options_.constraint == DbrConfig::NONE) {
+      return -moved.value - options_.entropy_weight * moved.entropy;
+    }
     return -moved.value - options_.entropy_weight * moved.entropy +
            kAlpha * (moved.divergence_plus - (repels ? moved.divergence_minus : at.threshold));
   }
@@ -210,7 +213,8 @@ INSTANTIATE_TEST_SUITE_P(Variants, ObjectiveTest,
                                          Case{DbrConfig::FIXED, DbrConfig::MMD_LAPLACIAN, false, 0, 0.05},
                                          Case{DbrConfig::DYNAMIC_MAX, DbrConfig::MMD_LAPLACIAN, true, 0,
                                               1e-3},
-                                         Case{DbrConfig::FIXED, DbrConfig::MMD_GAUSSIAN, false, 0.3, 0.05}));
+                                         Case{DbrConfig::FIXED, DbrConfig::MMD_GAUSSIAN, false, 0.3, 0.05},
+                                         Case{DbrConfig::NONE, DbrConfig::KL, true, 0.3, 0.05}));
 
 }  // namespace
 }  // namespace dbr

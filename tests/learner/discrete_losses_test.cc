@@ -56,9 +56,10 @@ class PolicyLossTest : public testing::TestWithParam<Case> {
     Matrix unused;
     const PolicyLoss<double> moved = Loss(logits, &unused);
     const bool repels = options_.repel_negative && at.threshold != options_.epsilon;
+    const bool constrained = options_.constraint != DbrConfig::NONE;
     const double threshold = repels ? moved.divergence_minus : at.threshold;
     return -moved.value - options_.entropy_weight * moved.entropy +
-           kAlpha * (moved.divergence_plus - threshold);
+           (constrained ? kAlpha * (moved.divergence_plus - threshold) : 0);
   }
 
   static constexpr double kAlpha = 0.7;
@@ -141,7 +142,8 @@ INSTANTIATE_TEST_SUITE_P(Options, PolicyLossTest,
                                          Case{DbrConfig::DYNAMIC_MIN, DbrConfig::KL, true, 0.0, 10.0},
                                          Case{DbrConfig::DYNAMIC_MIN, DbrConfig::MMD_EXACT, true, 0.2, 10.0},
                                          Case{DbrConfig::FIXED, DbrConfig::MMD_EXACT, false, 0.0, 0.05},
-                                         Case{DbrConfig::FIXED, DbrConfig::KL, true, 0.0, 0.05}));
+                                         Case{DbrConfig::FIXED, DbrConfig::KL, true, 0.0, 0.05},
+                                         Case{DbrConfig::NONE, DbrConfig::KL, true, 0.2, 0.05}));
 
 TEST(PolicyLoss, ThresholdFollowsTheConstraint) {
   Rng rng(2);

@@ -4,9 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <map>
 #include <thread>
 
 #include "absl/time/clock.h"
+#include "proto/config_file.h"
 #include "replay/replay_server.h"
 #include "replay/writer.h"
 #include "tests/learner/batches.h"
@@ -23,14 +26,19 @@ class TrainerTest : public testing::Test {
     Config config;
     config.mutable_replay()->set_capacity(1000);
     config.mutable_replay()->set_min_size(64);
-    ReplayServerOptions options = OptionsFrom(config, Layout());
+    StartReplay(OptionsFrom(config, Layout()));
+    auto metrics = MetricsSink::Open(RunFolder{folder_.path()}, absl::Seconds(1), absl::Now());
+    ASSERT_TRUE(metrics.ok()) << metrics.status();
+    metrics_ = std::move(metrics).value();
+  }
+
+  // In the place of the one before.
+  void StartReplay(ReplayServerOptions options) {
+    replay_.reset();
     options.server.address = "unix:" + folder_.path() + "/replay.sock";
     auto replay = ReplayServer::Start(options);
     ASSERT_TRUE(replay.ok()) << replay.status();
     replay_ = std::move(replay).value();
-    auto metrics = MetricsSink::Open(RunFolder{folder_.path()}, absl::Seconds(1), absl::Now());
-    ASSERT_TRUE(metrics.ok()) << metrics.status();
-    metrics_ = std::move(metrics).value();
   }
 
   static TransitionLayout Layout() { return {5, 1, 3}; }
@@ -114,6 +122,47 @@ TEST_F(TrainerTest, TrainsWritesAdvantagesBackAndSaves) {
   const auto policy = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
   ASSERT_TRUE(policy.ok()) << policy.status();
   EXPECT_EQ(policy->updates, kUpdates);
+}
+
+// The advantage ARM_CUMULATIVE from the config to the labels in the store: A_T = max(A_{T-1}, 0) + (Q - V),
+// whatever the sign, for every time that a transition is judged.
+TEST_F(TrainerTest, CumulativeAdvantagesAddUpInTheReplay) {
+  const auto config =
+      ParseConfig("algorithm { dbr { advantage: ARM_CUMULATIVE } } replay { capacity: 1000 min_size: 64 }");
+  ASSERT_TRUE(config.ok()) << config.status();
+  ReplayServerOptions options = OptionsFrom(*config, Layout());
+  options.store.path = folder_ / "replay.store";
+  StartReplay(options);
+  Insert(100);
+  AlgorithmSpec spec = SmallSpec();
+  *spec.config.mutable_dbr() = config->algorithm().dbr();
+  const auto algorithm = MakeAlgorithm(spec).value();
+  const BatchNeeds needs = algorithm->needs();
+  ReplayClient client(replay_->address());
+  std::map<std::uint64_t, float> expected;
+  int above_newest = 0;
+  for (std::uint64_t version = 1; version <= kUpdates; ++version) {
+    DrawnBatches drawn;
+    ASSERT_TRUE(
+        client.Sample({needs.uniform, needs.plus, needs.minus}, Layout(), absl::Seconds(10), &drawn).ok());
+    ASSERT_TRUE(algorithm->Update({drawn.uniform, drawn.plus, drawn.minus}).ok());
+    const absl::Span<const float> advantages = algorithm->advantages();
+    ASSERT_TRUE(client.Relabel(version, drawn.uniform.keys, advantages, absl::Seconds(10)).ok());
+    for (std::size_t i = 0; i < advantages.size(); ++i) {
+      float& sum = expected.try_emplace(drawn.uniform.keys[i], 0.0f).first->second;
+      sum = std::max(sum, 0.0f) + advantages[i];
+      above_newest += sum > advantages[i];
+    }
+  }
+  EXPECT_GT(above_newest, 100) << "else this could not be told from ARM";
+  replay_.reset();
+  options.store.resume = true;
+  const auto store = TransitionStore::Open(options.store);
+  ASSERT_TRUE(store.ok()) << store.status();
+  ASSERT_GT(expected.size(), 90u);
+  for (const auto& [key, advantage] : expected) {
+    EXPECT_EQ((*store)->labels((*store)->SlotOf(key)).advantage, advantage) << key;
+  }
 }
 
 TEST_F(TrainerTest, ContinuesFromItsCheckpoint) {

@@ -170,6 +170,32 @@ TEST(MaskedCategorical, LikelihoodGradientAgreesWithDifferences) {
       logits);
 }
 
+TEST(MaskedCategorical, WeightedLikelihoodHasItsGradientAndWeightsOfOneChangeNothing) {
+  Rng rng(6);
+  const Matrix logits = Uniform(4, 3, rng);
+  Matrix mask = Matrix::Ones(4, 3), actions(1, 3);
+  mask(2, 0) = 0;
+  actions << 1, 3, 0;
+  VectorX<double> weights(3), ones = VectorX<double>::Ones(3);
+  weights << 2.5, 0, 0.5;
+  Categorical<double> p;
+  MaskedSoftmax<double>(logits, mask, &p);
+  Matrix gradient, plain;
+  NegativeLogLikelihood<double>(p, actions, &gradient, &weights);
+  EXPECT_TRUE(gradient.col(1).isZero(0));
+  ExpectIsGradient(
+      gradient,
+      [&](const Matrix& z) {
+        Categorical<double> moved;
+        MaskedSoftmax<double>(z, mask, &moved);
+        return NegativeLogLikelihood<double>(moved, actions, nullptr, &weights);
+      },
+      logits);
+  EXPECT_DOUBLE_EQ(NegativeLogLikelihood<double>(p, actions, &gradient, &ones),
+                   NegativeLogLikelihood<double>(p, actions, &plain));
+  EXPECT_EQ(gradient, plain);
+}
+
 TEST(MaskedCategorical, AColumnWithoutLegalActionsIsZero) {
   Categorical<double> p;
   MaskedSoftmax<double>(Matrix::Ones(3, 1), Matrix::Zero(3, 1), &p);
@@ -260,6 +286,19 @@ TEST_F(Acting, AdvantageIsTheSmallerTwinLessItsMeanUnderThePolicy) {
   VectorX<float> advantage(1);
   runner_.Advantages(action, rng_, advantage);
   EXPECT_NEAR(advantage[0], 0.5 - (0.4 * 0.1 + 0.3 * 0.2 + 0.2 * 0.5 + 0.1 * 0.8), 1e-6);
+}
+
+TEST_F(Acting, TheValueOfAStateIsTheSmallerTwinsMeanUnderThePolicy) {
+  const auto policy = PolicyNetworks::Create(snapshot_);
+  MatrixX<float> masks = MatrixX<float>::Ones(4, 2);
+  masks(3, 1) = masks(2, 1) = 0;
+  VectorX<float> values(2);
+  runner_.Values(**policy, MatrixX<float>::Zero(1, 2), masks, rng_, values);
+  EXPECT_NEAR(values[0], 0.4 * 0.1 + 0.3 * 0.2 + 0.2 * 0.5 + 0.1 * 0.8, 1e-6);
+  EXPECT_NEAR(values[1], (0.4 * 0.1 + 0.3 * 0.2) / 0.7, 1e-6);
+  snapshot_.networks.resize(1);
+  runner_.Values(**PolicyNetworks::Create(snapshot_), MatrixX<float>::Zero(1, 2), masks, rng_, values);
+  EXPECT_TRUE(std::isnan(values[0]) && std::isnan(values[1]));
 }
 
 TEST_F(Acting, AMissingNetworkIsNamed) {

@@ -14,11 +14,13 @@ namespace {
 using testing::HasSubstr;
 
 constexpr TransitionLayout kLayout{.observation_width = 3, .action_width = 1, .mask_width = 2};
+constexpr TransitionLayout kWithReturns{
+    .observation_width = 3, .action_width = 1, .mask_width = 2, .return_width = 1};
 
 // A batch of two transitions that differ in every field.
-TransitionBatch TwoTransitions() {
+TransitionBatch TwoTransitions(const TransitionLayout& layout = kLayout) {
   TransitionBatch batch;
-  SetLayout(kLayout, &batch);
+  SetLayout(layout, &batch);
   const float observations[2][3] = {{1, 2, 3}, {4, 5, 6}}, actions[2][1] = {{0}, {1}},
               masks[2][2] = {{1, 1}, {0, 1}};
   const float next_observations[2][3] = {{7, 8, 9}, {10, 11, 12}}, next_masks[2][2] = {{1, 0}, {0, 0}};
@@ -29,7 +31,8 @@ TransitionBatch TwoTransitions() {
                       .reward = 0.5f + i,
                       .discount = i == 0 ? 0.99f : 0.0f,
                       .next_observation = next_observations[i],
-                      .next_mask = next_masks[i]},
+                      .next_mask = next_masks[i],
+                      .monte_carlo_return = 3.5f - 5 * i},
                      i == 0 ? kUnjudged : -0.25f, 7 + i, &batch);
   }
   return batch;
@@ -73,6 +76,38 @@ TEST(TransitionCodecTest, DecodesIntoOneColumnForEachTransition) {
   EXPECT_EQ(decoded.discounts[0], 0.99f);
   EXPECT_EQ(decoded.next_observations(1, 0), 8);
   EXPECT_EQ(decoded.next_masks(0, 0), 1);
+}
+
+TEST(TransitionCodecTest, ReturnsTravelWhereTheLayoutHasThem) {
+  TransitionBatch received;
+  ASSERT_TRUE(received.ParseFromString(TwoTransitions(kWithReturns).SerializeAsString()));
+  EXPECT_EQ(LayoutOf(received), kWithReturns);
+  EXPECT_EQ(RowOf(received, 0).monte_carlo_return, 3.5f);
+  EXPECT_EQ(RowOf(received, 1).monte_carlo_return, -1.5f);
+  Batch decoded;
+  ASSERT_TRUE(Decode(received, kWithReturns, &decoded).ok());
+  EXPECT_THAT(decoded.returns, testing::ElementsAre(3.5f, -1.5f));
+  EXPECT_EQ(decoded.next_observations(1, 0), 8);
+}
+
+TEST(TransitionCodecTest, WithoutThemTheyCostNothing) {
+  const TransitionBatch batch = TwoTransitions();
+  EXPECT_EQ(batch.returns_size(), 0);
+  EXPECT_TRUE(std::isnan(RowOf(batch, 0).monte_carlo_return));
+  Batch decoded;
+  ASSERT_TRUE(Decode(batch, kLayout, &decoded).ok());
+  EXPECT_EQ(decoded.returns.size(), 0);
+}
+
+TEST(TransitionCodecTest, ReturnsThatTheOtherSideDoesNotExpectAreRefusedByName) {
+  EXPECT_THAT(std::string(CheckShape(TwoTransitions(kWithReturns), kLayout).message()),
+              HasSubstr("return_width: expected 0, found 1"));
+  EXPECT_THAT(std::string(CheckShape(TwoTransitions(), kWithReturns).message()),
+              HasSubstr("return_width: expected 1, found 0"));
+  TransitionBatch batch = TwoTransitions(kWithReturns);
+  batch.mutable_returns()->Truncate(1);
+  EXPECT_THAT(std::string(CheckShape(batch, kWithReturns).message()),
+              HasSubstr("column 'returns': expected 2 rows of 1 values, found 1"));
 }
 
 TEST(TransitionCodecTest, SurvivesTheWire) {

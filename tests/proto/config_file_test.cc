@@ -206,6 +206,13 @@ TEST(PrintConfigTest, ReadsBackAsItself) {
   EXPECT_TRUE(MessageDifferencer::Equals(again, Parsed(PrintConfig(again))));
 }
 
+TEST(NeedsReturnsTest, OnlyTheAdvantageOfSelfImitationTakesThem) {
+  EXPECT_FALSE(NeedsReturns(Parsed("").algorithm()));
+  EXPECT_FALSE(NeedsReturns(Parsed("algorithm { dbr { advantage: ARM_CUMULATIVE } }").algorithm()));
+  EXPECT_TRUE(NeedsReturns(Parsed("algorithm { dbr { advantage: SIL } }").algorithm()));
+  EXPECT_FALSE(NeedsReturns(Parsed("algorithm { sac {} }").algorithm()));
+}
+
 TEST(LoadConfigTest, ErrorsStartWithTheFile) {
   const TempDir folder;
   const std::string path = folder / "bad.textproto";

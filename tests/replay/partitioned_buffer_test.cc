@@ -55,6 +55,28 @@ TEST_F(Buffer, DrawsWholeRowsOfTheAskedPartitions) {
   EXPECT_EQ(result_.inserted, 35u);
 }
 
+TEST_F(Buffer, DrawsReturnsWithTheirRows) {
+  store_options_.layout = kLayoutWithReturns;
+  Make();
+  ASSERT_TRUE(Insert(1, Rows(kLayoutWithReturns, 1, 200, 0.0f)).ok());
+  Drawn drawn(kLayoutWithReturns, 500);
+  ASSERT_TRUE(buffer_
+                  ->Draw({.counts = {0, 500, 0}, .allow_empty_partitions = false},
+                         {uniform_.columns(), drawn.columns(), minus_.columns()}, kNow, &result_)
+                  .ok());
+  drawn.ExpectWhole(500);
+}
+
+TEST_F(Buffer, RefusesAReturnThatIsNotFinite) {
+  store_options_.layout = kLayoutWithReturns;
+  Make();
+  Rows rows(kLayoutWithReturns, 1, 3, 1.0f);
+  rows.returns[1] = INFINITY;
+  ASSERT_TRUE(Insert(1, rows).ok());
+  EXPECT_EQ(buffer_->Stats().total, 2u);
+  EXPECT_EQ(buffer_->Stats().counters.refused, 1u);
+}
+
 TEST_F(Buffer, EvictsTheOldestFirst) {
   store_options_.capacity = 10;
   Make();

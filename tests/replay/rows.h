@@ -13,6 +13,8 @@
 namespace dbr {
 
 inline constexpr TransitionLayout kSmallLayout{.observation_width = 4, .action_width = 1, .mask_width = 3};
+inline constexpr TransitionLayout kLayoutWithReturns{
+    .observation_width = 4, .action_width = 1, .mask_width = 3, .return_width = 1};
 
 // Columns of transitions first, first + 1, ...: every value of transition i follows from i.
 class Rows {
@@ -32,6 +34,7 @@ class Rows {
             .masks = masks.data(),
             .rewards = rewards.data(),
             .discounts = discounts.data(),
+            .returns = returns.data(),
             .next_observations = next_observations.data(),
             .next_masks = next_masks.data(),
             .advantages = advantages.data(),
@@ -44,11 +47,12 @@ class Rows {
     for (const auto& part : {row.observation, row.action, row.mask})
       flat->insert(flat->end(), part.begin(), part.end());
     flat->insert(flat->end(), {row.reward, row.discount});
+    if (layout_.return_width > 0) flat->push_back(row.monte_carlo_return);
     for (const auto& part : {row.next_observation, row.next_mask})
       flat->insert(flat->end(), part.begin(), part.end());
   }
 
-  std::vector<float> observations, actions, masks, rewards, discounts, next_observations, next_masks,
+  std::vector<float> observations, actions, masks, rewards, discounts, returns, next_observations, next_masks,
       advantages;
   std::vector<std::uint64_t> critic_versions;
 
@@ -67,6 +71,7 @@ class Rows {
     }
     rewards.push_back(Value(i));
     discounts.push_back(0.5f);
+    if (layout_.return_width > 0) returns.push_back(2 * Value(i) + 1);
     advantages.push_back(advantage);
     critic_versions.push_back(0);
   }
@@ -84,6 +89,7 @@ class Drawn {
         masks(count * layout.mask_width),
         rewards(count),
         discounts(count),
+        returns(count * layout.return_width),
         next_observations(count * layout.observation_width),
         next_masks(count * layout.mask_width),
         layout_(layout) {}
@@ -95,6 +101,7 @@ class Drawn {
             .masks = masks.data(),
             .rewards = rewards.data(),
             .discounts = discounts.data(),
+            .returns = returns.data(),
             .next_observations = next_observations.data(),
             .next_masks = next_masks.data()};
   }
@@ -114,11 +121,14 @@ class Drawn {
         ASSERT_EQ(next_masks[i * layout_.mask_width + k], expected.next_masks[k]);
       }
       ASSERT_EQ(discounts[i], 0.5f);
+      if (layout_.return_width > 0) {
+        ASSERT_EQ(returns[i], expected.returns[0]);
+      }
     }
   }
 
   std::vector<std::uint64_t> keys;
-  std::vector<float> observations, actions, masks, rewards, discounts, next_observations, next_masks;
+  std::vector<float> observations, actions, masks, rewards, discounts, returns, next_observations, next_masks;
 
  private:
   TransitionLayout layout_;

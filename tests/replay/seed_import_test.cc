@@ -87,6 +87,70 @@ TEST_F(SeedImportTest, HoldsEveryTransitionOfTheFile) {
   }
 }
 
+TEST_F(SeedImportTest, RowsCarryTheReturnsOfTheirEpisodesWhereTheyAreWanted) {
+  options_.store.layout.return_width = 1;
+  Start();
+  std::vector<double> returns(rows());
+  std::size_t end = 0;
+  for (const TestEpisode& episode : episodes_) {
+    end += static_cast<std::size_t>(episode.steps());
+    double value = 0;
+    if (episode.ending == EpisodeEnding::kTimeLimit) {
+      const int last = std::min(episode.steps(), 4);  // 1 / (1 - 0.75)
+      for (int t = episode.steps() - last; t < episode.steps(); ++t)
+        value += episode.rewards[t] / last / 0.25;
+    }
+    for (int t = episode.steps(); t-- > 0;)
+      returns[end - static_cast<std::size_t>(episode.steps() - t)] = value =
+          episode.rewards[t] + 0.75 * value;
+  }
+  ReplayClient client(options_.server.address);
+  DrawnBatches drawn;
+  ASSERT_TRUE(client.Sample({.uniform = 2000}, options_.store.layout, kPatience, &drawn).ok());
+  for (int i = 0; i < drawn.uniform.size(); ++i) {
+    const std::size_t row = drawn.uniform.keys[i] - 1;
+    ASSERT_NEAR(drawn.uniform.returns[i], returns[row], 1e-5) << row;
+    ASSERT_EQ(drawn.uniform.rewards[i], expected_.rows[row][kLayout.reward_offset()]);
+    ASSERT_EQ(drawn.uniform.next_observations(0, i), expected_.rows[row][kLayout.next_observation_offset()]);
+  }
+}
+
+TEST_F(SeedImportTest, AnImportWithReturnsThatWasBrokenOffGoesOnWithinAnEpisode) {
+  options_.store.layout.return_width = 1;
+  const TransitionLayout layout = options_.store.layout;
+  Start();
+  server_.reset();
+  std::vector<float> whole;
+  {
+    auto store = *TransitionStore::Open(options_.store);
+    for (std::uint32_t slot = 0; slot < rows(); ++slot) {
+      whole.insert(whole.end(), store->row(slot), store->row(slot) + layout.stride());
+    }
+  }
+  options_.store.resume = false;
+  options_.store.path += ".2";
+  const std::size_t some = static_cast<std::size_t>(episodes_[0].steps() + episodes_[1].steps()) + 1;
+  {
+    auto buffer = *PartitionedBuffer::Make(*TransitionStore::Open(options_.store), {});
+    ASSERT_TRUE(buffer->InsertSeed(absl::MakeConstSpan(whole).first(some * layout.stride())).ok());
+  }
+  options_.store.resume = true;
+  Start();
+  server_.reset();
+  auto store = *TransitionStore::Open(options_.store);
+  ASSERT_EQ(store->size(), rows());
+  for (std::uint32_t slot = 0; slot < rows(); ++slot) {
+    ASSERT_EQ(store->row(slot)[layout.return_offset()],
+              whole[std::size_t{slot} * layout.stride() + layout.return_offset()]);
+  }
+}
+
+TEST_F(SeedImportTest, ReturnsOfCutEpisodesNeedADiscountBelowOne) {
+  options_.store.layout.return_width = 1;
+  options_.seed.discount = 1;
+  EXPECT_THAT(StartError().ToString(), HasSubstr("algorithm.discount: expected below 1"));
+}
+
 TEST_F(SeedImportTest, StatsTellOfTheSeedApart) {
   Start();
   const StatsReply stats = Stats();

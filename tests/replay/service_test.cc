@@ -104,6 +104,36 @@ TEST_F(ReplayOverSocket, GivesBackWhatWasWritten) {
   }
 }
 
+TEST_F(ReplayOverSocket, ReturnsComeBackAndAMissingOneIsRefused) {
+  options_.store.layout = kLayoutWithReturns;
+  StartServer();
+  WriterOptions writing = Writer();
+  writing.layout = kLayoutWithReturns;
+  TransitionWriter writer(writing);
+  const Rows rows(kLayoutWithReturns, 1, 100);
+  for (int i = 0; i < 100; ++i) {
+    TransitionView row = rows.columns().Row(kLayoutWithReturns, i);
+    if (i == 50) row.monte_carlo_return = kNoReturn;
+    ASSERT_TRUE(writer.Append(row, i % 2 == 0 ? 1 : -1, 1, std::nullopt, kPatience).ok());
+  }
+  ASSERT_TRUE(writer.Flush(kPatience).ok());
+  EXPECT_EQ(writer.counters().refused, 1u);
+  ReplayClient client(options_.server.address);
+  DrawnBatches drawn;
+  ASSERT_TRUE(
+      client.Sample({.uniform = 60, .plus = 50, .minus = 40}, kLayoutWithReturns, kPatience, &drawn).ok());
+  for (const Batch* batch : {&drawn.uniform, &drawn.plus, &drawn.minus}) {
+    ASSERT_EQ(batch->returns.size(), batch->size());
+    for (int i = 0; i < batch->size(); ++i) {
+      const Rows expected(kLayoutWithReturns, static_cast<std::uint64_t>(batch->rewards[i]), 1);
+      EXPECT_EQ(batch->returns[i], expected.returns[0]);
+      EXPECT_EQ(batch->next_observations(3, i), expected.next_observations[3]);
+    }
+  }
+  EXPECT_THAT(client.Sample({.uniform = 4}, kSmallLayout, kPatience, &drawn).ToString(),
+              HasSubstr("return_width: expected 0, found 1"));
+}
+
 TEST_F(ReplayOverSocket, CountsEpisodesAndRefusedRows) {
   StartServer();
   TransitionWriter writer(Writer());

@@ -13,6 +13,7 @@
 #include <fstream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "tests/replay/rows.h"
@@ -197,6 +198,42 @@ TEST_F(StoreInAFile, OtherWidthsAreRefused) {
   { Open(); }
   options_.layout.observation_width = 5;
   EXPECT_THAT(ResumeError().ToString(), AllOf(HasSubstr("widths 5/1/3"), HasSubstr("widths 4/1/3")));
+}
+
+TEST_F(StoreInAFile, ResumesReturns) {
+  options_.layout = kLayoutWithReturns;
+  {
+    auto store = Open();
+    ASSERT_TRUE(store->writers().Open({.id = 7, .name = "actor-0"}).ok());
+    const Rows rows(kLayoutWithReturns, 1, 3);
+    for (int i = 0; i < 3; ++i) store->Append(rows.columns().Row(kLayoutWithReturns, i), {.sequence = 1});
+  }
+  auto store = Resume();
+  ASSERT_EQ(store->size(), 3u);
+  for (std::uint64_t key = 1; key <= 3; ++key) {
+    const Rows expected(kLayoutWithReturns, key, 1);
+    std::vector<float> flat;
+    expected.AppendFlat(0, &flat);
+    const float* const row = store->row(store->SlotOf(key));
+    EXPECT_EQ(std::vector<float>(row, row + kLayoutWithReturns.stride()), flat);
+    EXPECT_EQ(row[kLayoutWithReturns.return_offset()], expected.returns[0]);
+  }
+}
+
+TEST_F(StoreInAFile, AStoreWithoutTheReturnsThatARunNeedsIsRefusedAndTheOtherWayRound) {
+  { Open(); }
+  options_.layout = kLayoutWithReturns;
+  const absl::Status lacks = ResumeError();
+  EXPECT_EQ(lacks.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(lacks.ToString(), AllOf(HasSubstr("with returns"), HasSubstr("found environment 'connect4', "
+                                                                           "widths 4/1/3 "
+                                                                           "(observation/action/mask), "
+                                                                           "without returns")));
+  std::filesystem::remove(options_.path);
+  options_.resume = false;
+  { Open(); }
+  options_.layout = kSmallLayout;
+  EXPECT_THAT(ResumeError().ToString(), HasSubstr("(observation/action/mask), with returns, capacity 100. "));
 }
 
 TEST_F(StoreInAFile, AnotherCapacityIsRefused) {
