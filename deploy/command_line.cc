@@ -19,6 +19,13 @@ int Fail(absl::string_view command, const absl::Status& status) {
   return absl::IsInvalidArgument(status) ? 2 : 1;
 }
 
+absl::StatusOr<std::string> ProgramsFolder() {
+  std::error_code error;
+  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
+  if (error) return absl::InternalError(absl::StrCat("cannot read /proc/self/exe: ", error.message()));
+  return self.parent_path().string();
+}
+
 absl::StatusOr<ActingMode> ParseActingMode(const std::string& name) {
   ActingMode mode;
   if (ActingMode_Parse(absl::AsciiStrToUpper(name), &mode)) return mode;

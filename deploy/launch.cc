@@ -12,6 +12,7 @@
 #include "core/file_io.h"
 #include "core/safetensors.h"
 #include "core/status_macros.h"
+#include "deploy/commit.h"
 #include "deploy/interrupt.h"
 #include "deploy/result_tables.h"
 #include "deploy/terminal.h"
@@ -81,10 +82,13 @@ Launch::Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_p
   summary_.algorithm = AlgorithmName(plan_.config);
   summary_.seed = plan_.config.seed();
   summary_.config = plan_.config_source;
+  summary_.commit = BuildCommit();
   summary_.seed_buffer.path = plan_.config.replay().seed().path();
   summary_.offline_updates = plan_.config.learner().offline_updates();
   summary_.every_updates = plan_.config.evaluation().every_updates();
   summary_.ended = "running";
+  summary_.failure.clear();
+  summary_.final_results.clear();
   ++summary_.launches;
 }
 

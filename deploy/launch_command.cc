@@ -1,7 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -21,14 +20,6 @@ struct LaunchFlags {
   LaunchOptions options;
   std::optional<std::uint64_t> seed;
 };
-
-// The folder of this program: the service programs stand beside it.
-absl::StatusOr<std::string> ProgramsFolder() {
-  std::error_code error;
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-  if (error) return absl::InternalError(absl::StrCat("cannot read /proc/self/exe: ", error.message()));
-  return self.parent_path().string();
-}
 
 absl::StatusOr<int> RunLaunch(const LaunchFlags& flags) {
   LaunchOptions options = flags.options;

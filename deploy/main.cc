@@ -1,8 +1,10 @@
 // dbr: launches runs, and asks about them.
 #include <CLI/CLI.hpp>
 
+#include "absl/strings/str_cat.h"
 #include "core/shutdown.h"
 #include "deploy/command_line.h"
+#include "deploy/commit.h"
 #include "nn/blas_setup.h"
 
 namespace {
@@ -12,12 +14,15 @@ int Main(int argc, char** argv) {
                "dbr");
   app.require_subcommand(1);
   app.footer("Each command has its own --help. Start with: dbr launch deploy/configs/connect4.textproto");
+  app.set_version_flag("--version", absl::StrCat("dbr ", DBR_VERSION, ", commit ", dbr::BuildCommit()),
+                       "Say which version this is");
   int exit_code = 0;
   dbr::AddLaunch(&app, &exit_code);
   dbr::AddStats(&app, &exit_code);
   dbr::AddEvaluate(&app, &exit_code);
   dbr::AddProbe(&app, &exit_code);
   dbr::AddDataset(&app, &exit_code);
+  dbr::AddExperiment(&app, &exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

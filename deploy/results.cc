@@ -12,6 +12,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
 Json Number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
 }
@@ -76,16 +78,32 @@ double Real(const Json& json, const char* key, double otherwise) {
   return found != json.end() && found->is_number() ? found->get<double>() : otherwise;
 }
 
+std::string Text(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_string() ? found->get<std::string>() : "";
+}
+
+// The objects of the list under `key`.
+std::vector<Json> Objects(const Json& json, const char* key) {
+  std::vector<Json> objects;
+  const auto found = json.find(key);
+  if (found == json.end() || !found->is_array()) return objects;
+  for (const Json& entry : *found) {
+    if (entry.is_object()) objects.push_back(entry);
+  }
+  return objects;
+}
+
+Json Object(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_object() ? *found : Json::object();
+}
+
 std::vector<EvaluationPoint> ReadCurve(const Json& json) {
   std::vector<EvaluationPoint> points;
-  const auto found = json.find("evaluations");
-  if (found == json.end() || !found->is_array()) return points;
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-  for (const Json& entry : *found) {
-    if (!entry.is_object()) continue;
-    const auto opponent = entry.find("opponent");
+  for (const Json& entry : Objects(json, "evaluations")) {
     points.push_back(
-        {.opponent = opponent != entry.end() && opponent->is_string() ? opponent->get<std::string>() : "",
+        {.opponent = Text(entry, "opponent"),
          .policy_version = Count(entry, "policy_version"),
          .updates = Count(entry, "updates"),
          .steps = Count(entry, "steps"),
@@ -107,6 +125,26 @@ std::set<std::uint64_t> ReadSkipped(const Json& json) {
     if (entry.is_number_unsigned()) skipped.insert(entry.get<std::uint64_t>());
   }
   return skipped;
+}
+
+std::vector<EvaluationResult> ReadResults(const Json& json) {
+  std::vector<EvaluationResult> results;
+  for (const Json& entry : Objects(json, "final")) {
+    const Json score = Object(entry, "score"), returns = Object(entry, "return");
+    results.push_back({.env = Text(entry, "env"),
+                       .opponent = Text(entry, "opponent"),
+                       .episodes = static_cast<int>(Count(entry, "episodes")),
+                       .seed = Count(entry, "seed"),
+                       .score_mean = Real(score, "mean", kNaN),
+                       .score_stderr = Real(score, "stderr", kNaN),
+                       .return_mean = Real(returns, "mean", kNaN),
+                       .return_stderr = Real(returns, "stderr", kNaN),
+                       .return_std = Real(returns, "std", kNaN),
+                       .return_min = Real(returns, "min", kNaN),
+                       .return_max = Real(returns, "max", kNaN),
+                       .length_mean = Real(Object(entry, "steps"), "mean", kNaN)});
+  }
+  return results;
 }
 
 }  // namespace
@@ -168,7 +206,8 @@ absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder) {
   Json final_results = Json::array();
   for (const EvaluationResult& result : summary.final_results) final_results.push_back(ToJson(result));
   Json json = {{"env", summary.env},       {"algorithm", summary.algorithm}, {"seed", summary.seed},
-               {"config", summary.config}, {"run_folder", folder.root},      {"ended", summary.ended}};
+               {"config", summary.config}, {"commit", summary.commit},       {"run_folder", folder.root},
+               {"ended", summary.ended}};
   if (!summary.failure.empty()) json["failure"] = summary.failure;
   if (summary.seed_buffer.rows > 0) {
     json["seed_buffer"] = SeedJson(summary.seed_buffer);
@@ -197,6 +236,13 @@ RunSummary ReadSummary(const RunFolder& folder) {
   if (!text.ok()) return summary;
   const Json json = Json::parse(*text, nullptr, /*allow_exceptions=*/false);
   if (!json.is_object()) return summary;
+  summary.env = Text(json, "env");
+  summary.algorithm = Text(json, "algorithm");
+  summary.seed = Count(json, "seed");
+  summary.config = Text(json, "config");
+  summary.commit = Text(json, "commit");
+  summary.ended = Text(json, "ended");
+  summary.failure = Text(json, "failure");
   summary.wall_s = Real(json, "wall_s", 0);
   summary.training_s = Real(json, "training_s", 0);
   summary.launches = Count(json, "launches");
@@ -205,7 +251,9 @@ RunSummary ReadSummary(const RunFolder& folder) {
   summary.updates = Count(json, "updates");
   summary.policy_version = Count(json, "policy_version");
   summary.restarts = Count(json, "restarts");
+  summary.offline_updates = Count(json, "offline_updates");
   summary.curve = EvaluationCurve(ReadCurve(json), ReadSkipped(json));
+  summary.final_results = ReadResults(json);
   return summary;
 }
 

@@ -37,6 +37,7 @@ struct RunSummary {
   std::string algorithm;
   std::uint64_t seed = 0;
   std::string config;  // the file that the run was launched with
+  std::string commit;  // of the newest launch's programs (deploy/commit.h)
   // running, max_episodes, max_steps, max_seconds, max_updates, stop_at_return, interrupted or failed
   std::string ended;
   std::string failure;    // of a failed one
@@ -65,7 +66,7 @@ struct RunSummary {
 
 absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder);
 
-// The times and counters of an earlier launch; zeros where there is no readable summary.
+// What an earlier launch wrote, but for its seed buffer; zeros where there is no readable summary.
 RunSummary ReadSummary(const RunFolder& folder);
 
 }  // namespace dbr

@@ -1,7 +1,6 @@
 #include "deploy/run_plan.h"
 
 #include <fcntl.h>
-#include <google/protobuf/util/message_differencer.h>
 #include <sys/file.h>
 #include <unistd.h>
 
@@ -17,7 +16,9 @@
 #include "core/file_io.h"
 #include "core/status_macros.h"
 #include "deploy/results.h"
+#include "deploy/same_run.h"
 #include "envs/env.h"
+#include "learner/algorithm.h"
 #include "proto/config_file.h"
 #include "replay/replay_server.h"
 #include "replay/seed_import.h"
@@ -75,14 +76,6 @@ absl::StatusOr<Config> LoadForLaunch(const LaunchOptions& options) {
   return config;
 }
 
-absl::StatusOr<EnvSpec> SpecOf(const Config& config) {
-  ASSIGN_OR_RETURN(
-      const std::unique_ptr<Env> env,
-      MakeEnv({.name = config.env().name(),
-               .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
-  return env->spec();
-}
-
 // Before a folder is made for a run that could not begin.
 absl::Status CheckSeed(const Config& config, const EnvSpec& env) {
   if (config.replay().seed().path().empty()) {
@@ -112,26 +105,6 @@ absl::Status CheckResumable(const RunFolder& folder, const Config& config) {
       absl::StrCat("--resume: '", folder.root, "' holds another run: ", same.message()));
 }
 
-// What must be equal for one run to go on as another, read through the printed form, in which every default
-// stands written.
-absl::StatusOr<Config> Identity(const Config& config) {
-  ASSIGN_OR_RETURN(const Config whole, ParseConfig(PrintConfig(config)));
-  Config identity;
-  *identity.mutable_env() = whole.env();
-  *identity.mutable_network() = whole.network();
-  *identity.mutable_algorithm() = whole.algorithm();
-  identity.mutable_replay()->set_capacity(whole.replay().capacity());
-  *identity.mutable_replay()->mutable_seed() = whole.replay().seed();
-  identity.mutable_replay()->mutable_seed()->clear_share();
-  return identity;
-}
-
-int ActorsFor(const Config& config) {
-  if (TrainsOfflineAlone(config)) return 0;
-  const int configured = static_cast<int>(config.actor().processes());
-  return configured > 0 ? configured : DefaultActors(static_cast<int>(std::thread::hardware_concurrency()));
-}
-
 ProcessSpec MakeProcess(const RunPlan& plan, const std::string& programs, const std::string& name,
                         const char* program, const std::vector<std::string>& arguments, int rank) {
   ProcessSpec process;
@@ -149,15 +122,6 @@ ProcessSpec MakeActor(const RunPlan& plan, const std::string& programs, const st
                      {"--index", absl::StrCat(index), "--processes", absl::StrCat(plan.actors), "--replay",
                       plan.replay_address, "--learner", plan.learner_address},
                      kStopActors);
-}
-
-// What differs between two messages of one type, as "path: before -> now" lines.
-std::string Differences(const google::protobuf::Message& before, const google::protobuf::Message& now) {
-  google::protobuf::util::MessageDifferencer differencer;
-  differencer.set_message_field_comparison(google::protobuf::util::MessageDifferencer::EQUIVALENT);
-  std::string report;
-  differencer.ReportDifferencesToString(&report);
-  return differencer.Compare(before, now) ? "" : report;
 }
 
 }  // namespace
@@ -185,7 +149,8 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
   }
   if (options.resume) RETURN_IF_ERROR(CheckRunFolder(RunFolder{options.run_dir}));
   ASSIGN_OR_RETURN(plan.config, LoadForLaunch(options));
-  ASSIGN_OR_RETURN(plan.env, SpecOf(plan.config));
+  ASSIGN_OR_RETURN(plan.env, EnvSpecOf(plan.config));
+  RETURN_IF_ERROR(CheckServes(plan.config.algorithm(), plan.env.name, plan.env.actions));
   RETURN_IF_ERROR(CheckExploration(plan.env, plan.config.actor()));
   plan.folder.root = options.run_dir.empty() ? DefaultRunDir(plan.config, now) : options.run_dir;
   plan.config_source = options.config.empty() ? plan.folder.config() : options.config;
@@ -202,7 +167,7 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
   ASSIGN_OR_RETURN(plan.learner_address, Address(plan.config.learner().address(),
                                                  plan.folder.learner_address(), "learner.address"));
   if (!plan.resume) RETURN_IF_ERROR(CheckSeed(plan.config, plan.env));
-  plan.actors = ActorsFor(plan.config);
+  plan.actors = ActorProcesses(plan.config);
   RETURN_IF_ERROR(MakeFolder(plan.folder));
   ASSIGN_OR_RETURN(plan.lock, RunFolderLock::Take(plan.folder));
   std::error_code none_there;
@@ -241,20 +206,24 @@ int DefaultActors(int cores) {
   return std::max(1, cores / 2);
 }
 
+absl::StatusOr<EnvSpec> EnvSpecOf(const Config& config) {
+  ASSIGN_OR_RETURN(
+      const std::unique_ptr<Env> env,
+      MakeEnv({.name = config.env().name(),
+               .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
+  return env->spec();
+}
+
+int ActorProcesses(const Config& config) {
+  if (TrainsOfflineAlone(config)) return 0;
+  const int configured = static_cast<int>(config.actor().processes());
+  return configured > 0 ? configured : DefaultActors(static_cast<int>(std::thread::hardware_concurrency()));
+}
+
 std::string AlgorithmName(const Config& config) {
   const auto* oneof = AlgorithmConfig::descriptor()->FindOneofByName("algorithm");
   const auto* chosen = config.algorithm().GetReflection()->GetOneofFieldDescriptor(config.algorithm(), oneof);
   return chosen == nullptr ? "dbr" : chosen->name();
-}
-
-absl::Status CheckSameRun(const Config& before, const Config& now) {
-  ASSIGN_OR_RETURN(const Config a, Identity(before));
-  ASSIGN_OR_RETURN(const Config b, Identity(now));
-  const std::string differing = Differences(a, b);
-  if (differing.empty()) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("these fields differ from its config.textproto (before -> now):\n", differing,
-                   "Resume without the new values, or start a new run."));
 }
 
 }  // namespace dbr

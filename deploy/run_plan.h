@@ -50,10 +50,10 @@ struct RunPlan {
 };
 
 // Loads and checks the config, makes the folder or checks that it can be continued, and writes the effective
-// config. Errors: InvalidArgument for a bad config or seed, or a config that differs from the folder's where
-// that would not continue the same run (each field is named); AlreadyExists where the folder is there and
-// `resume` was not said; NotFound where there is nothing to resume; FailedPrecondition where another launch
-// uses the folder.
+// config. Errors: InvalidArgument for a bad config or seed, an algorithm that does not serve the actions, or
+// a config that differs from the folder's where that would not continue the same run (each field is named);
+// AlreadyExists where the folder is there and `resume` was not said; NotFound where there is nothing to
+// resume; FailedPrecondition where another launch uses the folder.
 absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now);
 
 // In which order processes are stopped: each saves its state while what it needs is still there.
@@ -64,14 +64,17 @@ std::vector<ProcessSpec> Services(const RunPlan& plan, const std::string& progra
 // The actors, who start after the offline phase.
 std::vector<ProcessSpec> Actors(const RunPlan& plan, const std::string& programs);
 
+// The environment that a config names. InvalidArgument where there is none.
+absl::StatusOr<EnvSpec> EnvSpecOf(const Config& config);
+
+// How many a launch of `config` starts on this machine; 0: all training is offline.
+int ActorProcesses(const Config& config);
+
 // Actor processes for a machine of `cores`: half of them, for the learner, the replay and the evaluator want
 // the others.
 int DefaultActors(int cores);
 
 // "dbr", also where the config leaves the algorithm out.
 std::string AlgorithmName(const Config& config);
-
-// InvalidArgument, naming every field that differs, unless a run of `before` can go on under `now`.
-absl::Status CheckSameRun(const Config& before, const Config& now);
 
 }  // namespace dbr

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -34,8 +35,9 @@ sigset_t WatchedSignals() {
 
 struct Supervisor::Child {
   ProcessSpec spec;
-  pid_t pid = 0;        // 0: does not run
-  off_t log_start = 0;  // where the log of this start begins
+  pid_t pid = 0;                  // 0: does not run
+  std::optional<int> ended = {};  // with `once`: how
+  off_t log_start = 0;            // where the log of this start begins
   absl::Time restart_at = absl::InfiniteFuture();
   std::deque<absl::Time> restarts;  // within the window
 };
@@ -120,9 +122,28 @@ absl::Status Supervisor::ReapAll() {
   for (const auto& child : children_) {
     int status = 0;
     if (child->pid == 0 || waitpid(child->pid, &status, WNOHANG) != child->pid) continue;
-    RETURN_IF_ERROR(OnDeath(child.get(), status));
+    if (child->spec.once) {
+      NoteEnd(child.get(), status);
+    } else {
+      RETURN_IF_ERROR(OnDeath(child.get(), status));
+    }
   }
   return absl::OkStatus();
+}
+
+void Supervisor::NoteEnd(Child* child, int wait_status) {
+  child->pid = 0;
+  child->ended = wait_status;
+  options_.on_event(absl::StrCat(child->spec.name, " ", DescribeExit(wait_status)), /*notable=*/false);
+}
+
+std::vector<EndedProcess> Supervisor::TakeEnded() {
+  std::vector<EndedProcess> ended;
+  for (const auto& child : children_) {
+    if (child->ended.has_value()) ended.push_back({child->spec.name, *child->ended, child->log_start});
+  }
+  std::erase_if(children_, [](const auto& child) { return child->ended.has_value(); });
+  return ended;
 }
 
 // Plans the restart of a child that died, or says why there is none.
@@ -226,6 +247,10 @@ bool Supervisor::ReapStopped(int rank, bool* clean) {
     int status = 0;
     if (waitpid(child->pid, &status, WNOHANG) != child->pid) {
       running = true;
+      continue;
+    }
+    if (child->spec.once) {
+      NoteEnd(child.get(), status);
       continue;
     }
     child->pid = 0;

@@ -29,6 +29,14 @@ struct ProcessSpec {
   std::string log;                             // takes stdout and stderr, appended
   int stop_rank = 0;                           // lower ranks are stopped, and waited for, before higher ones
   absl::Duration stop_grace = absl::Seconds(30);  // from SIGTERM to SIGKILL
+  bool once = false;  // its end, however it comes, is no failure and never a restart: TakeEnded tells of it
+};
+
+// A process started with `once` that is over.
+struct EndedProcess {
+  std::string name;
+  int wait_status = 0;  // as waitpid gives it
+  off_t log_start = 0;  // where its words begin in its log
 };
 
 struct SupervisorOptions {
@@ -61,6 +69,9 @@ class Supervisor {
   // often.
   absl::Status Wait(absl::Time deadline);
 
+  // Those with `once` that have ended since the last call, in the order in which they were started.
+  std::vector<EndedProcess> TakeEnded();
+
   // Whether children that die are started again (they are, at first). Where not, Wait answers Aborted at the
   // first death.
   void set_restarting(bool restarting) { restarting_ = restarting; }
@@ -76,7 +87,7 @@ class Supervisor {
 
   // SIGTERM to each rank up to `last_rank` in turn, SIGKILL to what is still there after its grace, or at the
   // next stop signal. Blocks until all of them have ended. True where every one ended by itself with status
-  // 0.
+  // 0; how those with `once` ended does not count.
   bool Stop(int last_rank = std::numeric_limits<int>::max());
 
  private:
@@ -86,6 +97,7 @@ class Supervisor {
   absl::Status Spawn(Child* child, bool again);
   absl::Status RestartDue();
   absl::Status OnDeath(Child* child, int wait_status);
+  void NoteEnd(Child* child, int wait_status);
   absl::Status ReapAll();
   absl::Time NextRestart() const;
   bool StopRank(int rank);

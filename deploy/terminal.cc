@@ -107,4 +107,10 @@ int TerminalWidth(int fd, int otherwise) {
   return size.ws_col;
 }
 
+int TerminalHeight(int fd, int otherwise) {
+  winsize size{};
+  if (ioctl(fd, TIOCGWINSZ, &size) != 0 || size.ws_row == 0) return otherwise;
+  return size.ws_row;
+}
+
 }  // namespace dbr

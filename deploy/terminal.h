@@ -34,7 +34,8 @@ std::string PadLeft(absl::string_view text, int width);
 std::string Truncate(absl::string_view text, int width);
 
 bool IsTerminal(int fd);
-// Columns of the terminal at `fd`; `otherwise` where it is none.
+// Columns and rows of the terminal at `fd`; `otherwise` where it is none.
 int TerminalWidth(int fd, int otherwise);
+int TerminalHeight(int fd, int otherwise);
 
 }  // namespace dbr

@@ -79,9 +79,12 @@ class Algorithm {
   virtual absl::Status Load(const TensorFile& file) = 0;
 };
 
-// Makes the algorithm that spec.config names. InvalidArgument, naming the field, where it, or the variant
-// that the config chooses, does not serve the action space.
+// Makes the algorithm that spec.config names. Errors: CheckServes.
 absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& spec);
+
+// InvalidArgument, naming those that do, unless the algorithm that `config` sets serves the actions of the
+// environment; or, naming the field, where the variant that it chooses does not.
+absl::Status CheckServes(const AlgorithmConfig& config, const std::string& env, const ActionSpace& actions);
 
 // Name of the algorithm that a config sets ("dbr").
 std::string AlgorithmName(const AlgorithmConfig& config);

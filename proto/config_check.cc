@@ -121,4 +121,11 @@ void FindViolations(const Message& message, const std::string& path, std::vector
   }
 }
 
+absl::Status AllErrors(const std::vector<std::string>& errors, absl::string_view source) {
+  if (errors.empty()) return absl::OkStatus();
+  if (errors.size() == 1) return absl::InvalidArgumentError(absl::StrCat(source, ": ", errors[0]));
+  return absl::InvalidArgumentError(
+      absl::StrCat(source, ": ", errors.size(), " errors:\n  ", absl::StrJoin(errors, "\n  ")));
+}
+
 }  // namespace dbr

@@ -38,24 +38,6 @@ std::size_t EditDistance(absl::string_view a, absl::string_view b) {
   return row.back();
 }
 
-// "did you mean 'x'?", or all the names where none is near.
-std::string Suggest(const std::string& name, const std::vector<std::string>& known) {
-  const std::string lower = absl::AsciiStrToLower(name);
-  std::size_t best = std::numeric_limits<std::size_t>::max();
-  const std::string* nearest = nullptr;
-  for (const std::string& candidate : known) {
-    const std::size_t distance = EditDistance(lower, absl::AsciiStrToLower(candidate));
-    if (distance < best) {
-      best = distance;
-      nearest = &candidate;
-    }
-  }
-  if (nearest != nullptr && best <= std::max<std::size_t>(2, nearest->size() / 3)) {
-    return absl::StrCat("did you mean '", *nearest, "'?");
-  }
-  return absl::StrCat("known: ", absl::StrJoin(known, ", "));
-}
-
 std::string Expected(absl::string_view what, absl::string_view found) {
   return absl::StrCat("expected ", what, ", found '", found, "'");
 }
@@ -146,6 +128,23 @@ std::string SetText(absl::string_view text, const FieldDescriptor& field, Messag
 }
 
 }  // namespace
+
+std::string Suggest(const std::string& name, const std::vector<std::string>& known) {
+  const std::string lower = absl::AsciiStrToLower(name);
+  std::size_t best = std::numeric_limits<std::size_t>::max();
+  const std::string* nearest = nullptr;
+  for (const std::string& candidate : known) {
+    const std::size_t distance = EditDistance(lower, absl::AsciiStrToLower(candidate));
+    if (distance < best) {
+      best = distance;
+      nearest = &candidate;
+    }
+  }
+  if (nearest != nullptr && best <= std::max<std::size_t>(2, nearest->size() / 3)) {
+    return absl::StrCat("did you mean '", *nearest, "'?");
+  }
+  return absl::StrCat("known: ", absl::StrJoin(known, ", "));
+}
 
 std::string UnknownField(const std::string& name, const Descriptor& message) {
   std::vector<std::string> known;

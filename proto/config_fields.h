@@ -1,5 +1,4 @@
-// Setting one field of a config from its text, and naming what is near to a wrong name. For the readers in
-// this room.
+// Setting one field of a config from its text, and naming what is near to a wrong name.
 #pragma once
 
 #include <google/protobuf/descriptor.h>
@@ -11,6 +10,9 @@
 #include "absl/strings/string_view.h"
 
 namespace dbr {
+
+// "did you mean 'x'?", or all that are known where none is near.
+std::string Suggest(const std::string& name, const std::vector<std::string>& known);
 
 // What follows "path: " in a message about a wrong name: "unknown field; did you mean 'discount'?", or all
 // names where none is near.

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 #include "core/file_io.h"
 #include "core/status_macros.h"
 #include "proto/config_check.h"
@@ -19,13 +18,6 @@ namespace {
 using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using google::protobuf::Reflection;
-
-absl::Status AllErrors(const std::vector<std::string>& errors, const std::string& source) {
-  if (errors.empty()) return absl::OkStatus();
-  if (errors.size() == 1) return absl::InvalidArgumentError(absl::StrCat(source, ": ", errors[0]));
-  return absl::InvalidArgumentError(
-      absl::StrCat(source, ": ", errors.size(), " errors:\n  ", absl::StrJoin(errors, "\n  ")));
-}
 
 void SetDefault(const FieldDescriptor& field, Message* message) {
   const Reflection& reflection = *message->GetReflection();

@@ -114,12 +114,12 @@ absl::Status ContinuousBear<Scalar>::Load(const TensorFile& file) {
 template class ContinuousBear<float>;
 template class ContinuousBear<double>;
 
-absl::Status CheckContinuousBear(const AlgorithmSpec& spec) {
-  const DbrConfig::Divergence divergence = spec.config.bear().divergence();
+absl::Status CheckContinuousBear(const AlgorithmConfig& config, const std::string& env) {
+  const DbrConfig::Divergence divergence = config.bear().divergence();
   if (IsSampled(divergence)) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
       "algorithm.bear.divergence: expected MMD_LAPLACIAN or MMD_GAUSSIAN for the continuous actions of '",
-      spec.env, "', found ", DbrConfig::Divergence_Name(divergence),
+      env, "', found ", DbrConfig::Divergence_Name(divergence),
       ". The behaviour model is a VAE, which gives samples and no density: set one of the two."));
 }
 

@@ -71,7 +71,7 @@ class ContinuousBear {
 };
 
 // InvalidArgument where the divergence is none that samples give: a VAE has no density.
-absl::Status CheckContinuousBear(const AlgorithmSpec& spec);
+absl::Status CheckContinuousBear(const AlgorithmConfig& config, const std::string& env);
 std::unique_ptr<Algorithm> MakeContinuousBear(const AlgorithmSpec& spec);
 
 }  // namespace dbr

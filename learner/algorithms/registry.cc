@@ -1,6 +1,10 @@
 // The table of algorithms: one line for each.
+#include <algorithm>
+#include <iterator>
+
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "core/status_macros.h"
 #include "learner/algorithm.h"
 #include "learner/algorithms/awac.h"
 #include "learner/algorithms/brac.h"
@@ -25,7 +29,7 @@ struct Entry {
   const char* source;    // the publication
   const char* variants;  // the fields of its config message that choose between variants
   // InvalidArgument where a variant does not serve these actions; null: all do.
-  absl::Status (*check)(const AlgorithmSpec&) = nullptr;
+  absl::Status (*check)(const AlgorithmConfig&, const std::string& env) = nullptr;
 };
 
 constexpr char kDbrSource[] = "Siu, Traish, Xu 2021";
@@ -69,23 +73,30 @@ std::string AlgorithmName(const AlgorithmConfig& config) {
   return "";
 }
 
-absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& spec) {
+absl::Status CheckServes(const AlgorithmConfig& config, const std::string& env, const ActionSpace& actions) {
   std::vector<std::string> serving;
   for (const Entry& entry : kAlgorithms) {
-    if (entry.actions != spec.actions.kind) continue;
-    serving.push_back(entry.name);
-    if (entry.config_case != spec.config.algorithm_case()) continue;
-    if (entry.check != nullptr) {
-      if (absl::Status status = entry.check(spec); !status.ok()) return status;
+    if (entry.actions != actions.kind) continue;
+    if (entry.config_case == config.algorithm_case()) {
+      return entry.check == nullptr ? absl::OkStatus() : entry.check(config, env);
     }
-    std::unique_ptr<Algorithm> algorithm = entry.make(spec);
-    return spec.normalize_observations ? Normalized(spec, std::move(algorithm)) : std::move(algorithm);
+    serving.push_back(entry.name);
   }
-  const std::string name = AlgorithmName(spec.config);
+  const std::string name = AlgorithmName(config);
   return absl::InvalidArgumentError(absl::StrCat("config field 'algorithm': expected one that serves the ",
-                                                 NameOf(spec.actions.kind), " actions of environment '",
-                                                 spec.env, "' (", absl::StrJoin(serving, ", "), "), found ",
+                                                 NameOf(actions.kind), " actions of environment '", env,
+                                                 "' (", absl::StrJoin(serving, ", "), "), found ",
                                                  name.empty() ? "none" : name));
+}
+
+absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& spec) {
+  RETURN_IF_ERROR(CheckServes(spec.config, spec.env, spec.actions));
+  const Entry* entry =
+      std::find_if(std::begin(kAlgorithms), std::end(kAlgorithms), [&spec](const Entry& one) {
+        return one.actions == spec.actions.kind && one.config_case == spec.config.algorithm_case();
+      });
+  std::unique_ptr<Algorithm> algorithm = entry->make(spec);
+  return spec.normalize_observations ? Normalized(spec, std::move(algorithm)) : std::move(algorithm);
 }
 
 }  // namespace dbr

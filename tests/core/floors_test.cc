@@ -24,8 +24,8 @@ struct Room {
 const std::vector<Room>& Rooms() {
   static const auto* rooms = new std::vector<Room>{
       {"core", 0, {"core/"}},
-      {"config schema", 0, {"proto/config.pb.h"}},
-      {"config reader", 1, {"proto/config_"}},
+      {"config schema", 0, {"proto/config.pb.h", "proto/experiment.pb.h"}},
+      {"config reader", 1, {"proto/config_", "proto/experiment_"}},
       {"wire", 1, {"proto/"}},
       {"nn", 1, {"nn/"}},
       {"envs", 1, {"envs/"}},

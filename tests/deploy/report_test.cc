@@ -203,6 +203,7 @@ TEST(ResultsTest, SummaryKeepsItsCountersOverAResume) {
   summary.Update(sample);
   summary.ended = "interrupted";
   summary.config = "bad \xff byte";
+  summary.commit = "abc+changes";
   summary.training_s = 12.5;
   summary.launches = 2;
   summary.final_results = {Against("random", 0.9)};
@@ -216,6 +217,10 @@ TEST(ResultsTest, SummaryKeepsItsCountersOverAResume) {
   EXPECT_EQ(read.training_s, 12.5);
   EXPECT_EQ(read.launches, 2);
   EXPECT_EQ(read.transitions, 123456);
+  EXPECT_EQ(read.ended, "interrupted");
+  EXPECT_EQ(read.commit, "abc+changes");
+  ASSERT_EQ(read.final_results.size(), 1);
+  EXPECT_EQ(ToJson(read.final_results[0]), ToJson(summary.final_results[0]));
 }
 
 TEST(ResultsTest, SummaryNamesTheIterationsThatWereNotEvaluated) {

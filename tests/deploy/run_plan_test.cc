@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
+#include "deploy/same_run.h"
 #include "proto/config_file.h"
 #include "tests/temp_dir.h"
 
@@ -163,6 +164,15 @@ TEST_F(RunPlanTest, RefusesNoiseOnDiscreteActionsBeforeItMakesAFolder) {
   const auto plan = PrepareRun(Options({"actor.action_noise=0.1"}), kNow);
   EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(plan.status().message()), HasSubstr("actor.action_noise: expected 0"));
+  EXPECT_FALSE(std::filesystem::exists(run_));
+}
+
+TEST_F(RunPlanTest, RefusesAnAlgorithmThatDoesNotServeTheActionsBeforeItMakesAFolder) {
+  ASSERT_TRUE(WriteFileAtomically(config_, "env { name: 'connect4' } algorithm { sac {} }").ok());
+  const auto plan = PrepareRun(Options(), kNow);
+  EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(plan.status().message()),
+              AllOf(HasSubstr("discrete actions of environment 'connect4'"), HasSubstr("found sac")));
   EXPECT_FALSE(std::filesystem::exists(run_));
 }
 

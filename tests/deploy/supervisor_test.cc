@@ -29,6 +29,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Pair;
 using ::testing::SizeIs;
 using ::testing::UnorderedElementsAre;
 
@@ -229,6 +230,40 @@ TEST_F(SupervisorTest, CountsStopSignalsAndReturnsAtOnce) {
   kill(getpid(), SIGHUP);  // the terminal went away while we stop: no reason to kill anything
   EXPECT_TRUE(supervisor->Wait(absl::InfiniteFuture()).ok());
   EXPECT_EQ(supervisor->stop_signals(), expected);
+}
+
+TEST_F(SupervisorTest, TellsHowThoseThatRunOnceEndedAndStartsThemNoMore) {
+  const auto supervisor = Make();
+  const std::string starts = folder_ / "starts";
+  for (const char* status : {"0", "3"}) {
+    ProcessSpec spec = Child(status, {"append", starts, "exit", status});
+    spec.once = true;
+    ASSERT_TRUE(supervisor->Start(spec).ok());
+  }
+  std::vector<std::pair<std::string, std::string>> ends;
+  const absl::Time deadline = absl::Now() + kLong;
+  while (ends.size() < 2 && absl::Now() < deadline) {
+    ASSERT_TRUE(supervisor->Wait(deadline).ok());
+    for (const EndedProcess& ended : supervisor->TakeEnded())
+      ends.emplace_back(ended.name, DescribeExit(ended.wait_status));
+  }
+  EXPECT_THAT(ends,
+              UnorderedElementsAre(Pair("0", "exited with status 0"), Pair("3", "exited with status 3")));
+  EXPECT_THAT(Lines(starts), SizeIs(2));
+  EXPECT_THAT(supervisor->TakeEnded(), IsEmpty());
+  EXPECT_THAT(events_, IsEmpty());
+}
+
+TEST_F(SupervisorTest, StopsThoseThatRunOnceWithTheOthers) {
+  const auto supervisor = Make();
+  const Liveness liveness(folder_ / "alive");
+  ProcessSpec spec = Child("run", {"hold", liveness.path(), "wait", folder_ / "ends", "run"});
+  spec.once = true;
+  ASSERT_TRUE(supervisor->Start(spec).ok());
+  ASSERT_TRUE(liveness.HeldBy(1));
+  EXPECT_TRUE(supervisor->Stop());
+  EXPECT_THAT(Lines(folder_ / "ends"), ElementsAre("run"));
+  EXPECT_THAT(supervisor->TakeEnded(), SizeIs(1));
 }
 
 TEST_F(SupervisorTest, WakeEndsAWait) {
