@@ -23,6 +23,8 @@ void AddEvaluate(CLI::App* app, int* exit_code);
 void AddProbe(CLI::App* app, int* exit_code);
 void AddDataset(CLI::App* app, int* exit_code);
 void AddExperiment(CLI::App* app, int* exit_code);
+void AddReport(CLI::App* app, int* exit_code);
+void AddAlgorithms(CLI::App* app, int* exit_code);
 
 // Prints "dbr COMMAND: MESSAGE" to stderr; 2 for what the user typed or wrote (InvalidArgument), 1 for the
 // rest.

@@ -1,12 +1,14 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/file_io.h"
 #include "core/status_macros.h"
 #include "deploy/command_line.h"
 #include "deploy/experiment_cell.h"
@@ -47,6 +49,15 @@ void PrintPlan(const Grid& grid) {
   }
 }
 
+// What `dbr report` reads beside the cells: the grid, and the scale that they run at.
+absl::Status WriteDescription(const Experiment& experiment, const Grid& grid) {
+  std::error_code error;
+  std::filesystem::create_directories(grid.run_dir, error);
+  if (error) return ErrnoStatus(error.value(), "cannot create", grid.run_dir);
+  RETURN_IF_ERROR(WriteFileAtomically(absl::StrCat(grid.run_dir, "/", kGridFile), experiment.DebugString()));
+  return WriteFileAtomically(absl::StrCat(grid.run_dir, "/", kScaleFile), absl::StrCat(grid.scale, "\n"));
+}
+
 absl::StatusOr<int> RunExperiment(const ExperimentFlags& flags) {
   ASSIGN_OR_RETURN(const Experiment experiment, LoadExperiment(flags.grid));
   ASSIGN_OR_RETURN(Grid grid, MakeGrid(experiment, flags.cells));
@@ -54,6 +65,7 @@ absl::StatusOr<int> RunExperiment(const ExperimentFlags& flags) {
     PrintPlan(grid);
     return 0;
   }
+  RETURN_IF_ERROR(WriteDescription(experiment, grid));
   ExperimentOptions options = flags.run;
   ASSIGN_OR_RETURN(options.programs, ProgramsFolder());
   options.capacity.cores = static_cast<int>(std::thread::hardware_concurrency());

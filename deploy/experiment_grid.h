@@ -11,6 +11,10 @@
 
 namespace dbr {
 
+// In a grid's run folder, for reports: the grid as text, and the name of the scale that its cells run at.
+inline constexpr absl::string_view kGridFile = "experiment.textproto";
+inline constexpr absl::string_view kScaleFile = "scale.txt";
+
 struct GridOptions {
   std::string scale = {};              // empty: the grid's first
   std::uint32_t seeds = 0;             // 0: as many as the scale says

@@ -23,6 +23,8 @@ int Main(int argc, char** argv) {
   dbr::AddProbe(&app, &exit_code);
   dbr::AddDataset(&app, &exit_code);
   dbr::AddExperiment(&app, &exit_code);
+  dbr::AddReport(&app, &exit_code);
+  dbr::AddAlgorithms(&app, &exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,11 +1,12 @@
 #include "deploy/results.h"
 
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
+#include "deploy/summary_reader.h"
 
 namespace dbr {
 namespace {
@@ -66,85 +67,6 @@ Json ReturnsJson(const RunSummary& summary) {
           {"after_offline", ToJson(summary.AfterOffline())},
           {"lowest_online", ToJson(summary.curve.LowestOnline())},
           {"end", end}};
-}
-
-std::uint64_t Count(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  return found != json.end() && found->is_number_unsigned() ? found->get<std::uint64_t>() : 0;
-}
-
-double Real(const Json& json, const char* key, double otherwise) {
-  const auto found = json.find(key);
-  return found != json.end() && found->is_number() ? found->get<double>() : otherwise;
-}
-
-std::string Text(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  return found != json.end() && found->is_string() ? found->get<std::string>() : "";
-}
-
-// The objects of the list under `key`.
-std::vector<Json> Objects(const Json& json, const char* key) {
-  std::vector<Json> objects;
-  const auto found = json.find(key);
-  if (found == json.end() || !found->is_array()) return objects;
-  for (const Json& entry : *found) {
-    if (entry.is_object()) objects.push_back(entry);
-  }
-  return objects;
-}
-
-Json Object(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  return found != json.end() && found->is_object() ? *found : Json::object();
-}
-
-std::vector<EvaluationPoint> ReadCurve(const Json& json) {
-  std::vector<EvaluationPoint> points;
-  for (const Json& entry : Objects(json, "evaluations")) {
-    points.push_back(
-        {.opponent = Text(entry, "opponent"),
-         .policy_version = Count(entry, "policy_version"),
-         .updates = Count(entry, "updates"),
-         .steps = Count(entry, "steps"),
-         .episodes = Count(entry, "episodes"),
-         .score_mean = Real(entry, "score_mean", kNaN),
-         .score_stderr = Real(entry, "score_stderr", kNaN),
-         .return_mean = Real(entry, "return_mean", kNaN),
-         .return_std = Real(entry, "return_std", kNaN),
-         .iteration = entry.contains("iteration") ? std::optional(Count(entry, "iteration")) : std::nullopt});
-  }
-  return points;
-}
-
-std::set<std::uint64_t> ReadSkipped(const Json& json) {
-  std::set<std::uint64_t> skipped;
-  const auto found = json.find("skipped_iterations");
-  if (found == json.end() || !found->is_array()) return skipped;
-  for (const Json& entry : *found) {
-    if (entry.is_number_unsigned()) skipped.insert(entry.get<std::uint64_t>());
-  }
-  return skipped;
-}
-
-std::vector<EvaluationResult> ReadResults(const Json& json) {
-  std::vector<EvaluationResult> results;
-  for (const Json& entry : Objects(json, "final")) {
-    const Json score = Object(entry, "score"), returns = Object(entry, "return");
-    results.push_back({.env = Text(entry, "env"),
-                       .opponent = Text(entry, "opponent"),
-                       .episodes = static_cast<int>(Count(entry, "episodes")),
-                       .seed = Count(entry, "seed"),
-                       .score_mean = Real(score, "mean", kNaN),
-                       .score_stderr = Real(score, "stderr", kNaN),
-                       .return_mean = Real(returns, "mean", kNaN),
-                       .return_stderr = Real(returns, "stderr", kNaN),
-                       .return_std = Real(returns, "std", kNaN),
-                       .return_min = Real(returns, "min", kNaN),
-                       .return_max = Real(returns, "max", kNaN),
-                       .length_mean = Real(Object(entry, "steps"), "mean", kNaN)});
-  }
-  return results;
 }
 
 }  // namespace
@@ -231,29 +153,10 @@ absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder) {
 }
 
 RunSummary ReadSummary(const RunFolder& folder) {
+  absl::StatusOr<RunSummary> earlier = LoadSummary(folder);
   RunSummary summary;
-  const absl::StatusOr<std::string> text = ReadFile(folder.summary());
-  if (!text.ok()) return summary;
-  const Json json = Json::parse(*text, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object()) return summary;
-  summary.env = Text(json, "env");
-  summary.algorithm = Text(json, "algorithm");
-  summary.seed = Count(json, "seed");
-  summary.config = Text(json, "config");
-  summary.commit = Text(json, "commit");
-  summary.ended = Text(json, "ended");
-  summary.failure = Text(json, "failure");
-  summary.wall_s = Real(json, "wall_s", 0);
-  summary.training_s = Real(json, "training_s", 0);
-  summary.launches = Count(json, "launches");
-  summary.games = Count(json, "games");
-  summary.transitions = Count(json, "transitions");
-  summary.updates = Count(json, "updates");
-  summary.policy_version = Count(json, "policy_version");
-  summary.restarts = Count(json, "restarts");
-  summary.offline_updates = Count(json, "offline_updates");
-  summary.curve = EvaluationCurve(ReadCurve(json), ReadSkipped(json));
-  summary.final_results = ReadResults(json);
+  if (earlier.ok()) summary = *std::move(earlier);
+  summary.seed_buffer = SeedSummary();
   return summary;
 }
 
