@@ -19,7 +19,7 @@ namespace dbr {
 
 struct StepLoopOptions {
   ActingMode mode = SAMPLE;
-  ExplorationOptions exploration;
+  ExplorationOptions exploration = {};
   double discount = 0.99;  // of every transition that does not end in a true terminal
   // Transitions go out when their episode has ended, with their returns and R - V(s) as first advantage.
   bool with_returns = false;

@@ -37,7 +37,9 @@ std::vector<float> AskBehavior(const PolicyNetworks& policy, const connect4::Boa
 absl::StatusOr<BoardAnswer> AskAboutBoard(const PolicyNetworks& policy, const std::string& label) {
   ASSIGN_OR_RETURN(const connect4::Board board, connect4::Board::FromMoves(kBoardMoves));
   ASSIGN_OR_RETURN(const std::vector<ProbedPosition> probed, Probe(policy, {board}, MODE, 1));
-  BoardAnswer answer = {.label = label, .move = probed[0].move};
+  BoardAnswer answer;
+  answer.label = label;
+  answer.move = probed[0].move;
   const std::pair<const char*, std::vector<float>> all[] = {{"π", probed[0].pi},
                                                             {"β+", probed[0].beta_plus},
                                                             {"β−", probed[0].beta_minus},

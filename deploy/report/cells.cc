@@ -52,6 +52,15 @@ int IndexOf(const google::protobuf::RepeatedPtrField<Named>& list, const std::st
   return found == list.end() ? -1 : static_cast<int>(found - list.begin());
 }
 
+// One that was not run.
+Cell CellAt(int task, int contender, std::uint64_t seed) {
+  Cell cell;
+  cell.task = task;
+  cell.contender = contender;
+  cell.seed = seed;
+  return cell;
+}
+
 CellState StateOf(const RunSummary& summary) {
   if (summary.ended.empty() || summary.ended == "running") return CellState::kRunning;
   if (summary.ended == "failed") return CellState::kFailed;
@@ -69,7 +78,7 @@ void ReadSummaryOf(Cell* cell, std::vector<std::string>* notes) {
   }
   cell->state = absl::IsNotFound(summary.status()) ? CellState::kRunning : CellState::kFailed;
   if (cell->state == CellState::kRunning) return;  // it has just begun
-  cell->failure = summary.status().message();
+  cell->failure = std::string(summary.status().message());
   notes->push_back(cell->failure);
 }
 
@@ -105,7 +114,7 @@ class Gatherer {
         if (!dbr::TakesPart(runs_->grid.contender(c), runs_->grid.task(t))) continue;
         for (int seed = 1; seed <= seeds; ++seed) {
           const std::uint64_t number = seed;
-          cells_.try_emplace(CellKey(t, c, number), Cell{.task = t, .contender = c, .seed = number});
+          cells_.try_emplace(CellKey(t, c, number), CellAt(t, c, number));
         }
       }
     }
@@ -126,7 +135,9 @@ class Gatherer {
       std::uint64_t seed = 0;
       if (!absl::StartsWith(name, kSeedPrefix) || !absl::SimpleAtoi(name.substr(kSeedPrefix.size()), &seed))
         continue;
-      Take({.task = task, .contender = contender, .seed = seed, .folder = absl::StrCat(folder, "/", name)});
+      Cell cell = CellAt(task, contender, seed);
+      cell.folder = absl::StrCat(folder, "/", name);
+      Take(std::move(cell));
     }
   }
 

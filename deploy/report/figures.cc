@@ -118,7 +118,8 @@ void AddFamily(const Runs& runs, const std::vector<Row>& rows, const std::vector
   const Contender& base = runs.grid.contender(family[0]);
   document->Add(Heading{2, absl::StrCat("Ablations of ", LabelOf(base))});
   AddAblationTable(runs, rows, family, document);
-  BarPlot bars = {.our_label = "IQM over seeds, 95% interval"};
+  BarPlot bars;
+  bars.our_label = "IQM over seeds, 95% interval";
   std::vector<std::string> nothing;
   for (const Row& row : rows) {
     if (std::none_of(family.begin() + 1, family.end(), [&row](int c) { return row.samples[c].all() > 0; }))
@@ -153,9 +154,9 @@ void AddBars(const Runs& runs, const std::vector<Row>& rows, Document* document,
     auto group =
         std::find_if(groups.begin(), groups.end(), [&name](const auto& one) { return one.first == name; });
     if (group == groups.end()) {
-      groups.push_back(
-          {name, {.published_label = "published, ± std", .our_label = "ours, ± std over seeds"}});
-      group = groups.end() - 1;
+      group = groups.emplace(groups.end(), name, BarPlot());
+      group->second.published_label = "published, ± std";
+      group->second.our_label = "ours, ± std over seeds";
     }
     group->second.panels.push_back(BesidePublished(runs, row));
   }

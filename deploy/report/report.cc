@@ -72,7 +72,9 @@ std::vector<std::string> ReadFigures(const std::string& folder, Document* docume
 absl::StatusOr<ReportOutcome> WriteReport(const ReportOptions& options) {
   ASSIGN_OR_RETURN(Runs runs, LoadRuns(options.runs, options.grid));
   RETURN_IF_ERROR(MakeFolder(absl::StrCat(options.out, "/plots")));
-  ReportOutcome outcome = {.counts = CountsOf(runs), .notes = std::move(runs.notes)};
+  ReportOutcome outcome;
+  outcome.counts = CountsOf(runs);
+  outcome.notes = std::move(runs.notes);
   const std::vector<Row> rows = MakeRows(runs);
   Document document;
   Drawings drawings(options.out);

@@ -4,12 +4,6 @@
 #include "learner/parts/update_metrics.h"
 
 namespace dbr {
-namespace {
-
-constexpr char kBehavior[] = "behavior";
-
-}  // namespace
-
 template <class Scalar>
 Brac<Scalar>::Brac(const AlgorithmSpec& spec)
     : networks_(spec, /*policy_target=*/true),

@@ -10,7 +10,7 @@ namespace dbr {
 
 template <class Scalar>
 struct SampledQOptions {
-  QTermOptions q;
+  QTermOptions q = {};
   Scalar entropy_weight = 0;
 };
 

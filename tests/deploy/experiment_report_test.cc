@@ -152,10 +152,10 @@ TEST_F(ReportTest, SaysWhichFoldersTheGridDoesNotKnow) {
 
 TEST_F(ReportTest, RefusesAFolderThatHoldsNoExperiment) {
   std::filesystem::create_directories(folder_ / "empty");
-  const auto empty = WriteReport({.runs = {folder_ / "empty"}, .out = folder_ / "out"});
+  const auto empty = WriteReport({.runs = {folder_ / "empty"}, .grid = "", .out = folder_ / "out"});
   EXPECT_EQ(empty.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(empty.status().message()), HasSubstr("without experiment.textproto"));
-  const auto none = WriteReport({.runs = {folder_ / "nowhere"}, .out = folder_ / "out"});
+  const auto none = WriteReport({.runs = {folder_ / "nowhere"}, .grid = "", .out = folder_ / "out"});
   EXPECT_THAT(std::string(none.status().message()), HasSubstr("which is no folder"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
@@ -175,7 +175,7 @@ TEST_F(ReportTest, AnotherGridMayTakeThePlaceOfTheRunsOwn) {
 TEST_F(ReportTest, SaysWhereItCannotWrite) {
   WriteFakeRuns(folder_ / "runs");
   ASSERT_TRUE(WriteFileAtomically(folder_ / "file", "").ok());
-  const auto outcome = WriteReport({.runs = {folder_ / "runs"}, .out = folder_ / "file/out"});
+  const auto outcome = WriteReport({.runs = {folder_ / "runs"}, .grid = "", .out = folder_ / "file/out"});
   EXPECT_THAT(std::string(outcome.status().message()),
               AllOf(HasSubstr("--out"), HasSubstr(folder_ / "file/out")));
 }

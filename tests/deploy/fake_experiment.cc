@@ -78,13 +78,15 @@ RunSummary FakeHopper(double mean_return, std::uint64_t seed) {
   summary.offline_updates = summary.updates;
   std::vector<EvaluationPoint> points;
   for (int i = 1; i <= kEvaluations; ++i) {
-    points.push_back({.updates = static_cast<std::uint64_t>(1500 * i),
+    points.push_back({.opponent = "",
+                      .updates = static_cast<std::uint64_t>(1500 * i),
                       .episodes = 100,
                       .return_mean = mean_return * (1 - std::exp(-0.3 * i)) + 3.0 * seed,
                       .return_std = 10});
   }
   summary.curve = EvaluationCurve(std::move(points));
   summary.final_results = {{.env = "hopper",
+                            .opponent = "",
                             .episodes = 1000,
                             .seed = seed,
                             .score_mean = kNaN,

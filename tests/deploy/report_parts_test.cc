@@ -2,11 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "absl/strings/str_cat.h"
 #include "deploy/gnuplot.h"
 #include "deploy/report/board_figure.h"
 #include "deploy/report/curves.h"
@@ -29,13 +30,18 @@ using ::testing::Not;
 using ::testing::SizeIs;
 
 Cell Finished(std::vector<EvaluationPoint> points) {
-  Cell cell = {.state = CellState::kDone};
+  Cell cell;
+  cell.state = CellState::kDone;
   cell.summary.curve = EvaluationCurve(std::move(points));
   return cell;
 }
 
 EvaluationPoint At(std::uint64_t updates, double value) {
-  return {.updates = updates, .steps = 10 * updates, .return_mean = value};
+  EvaluationPoint point;
+  point.updates = updates;
+  point.steps = 10 * updates;
+  point.return_mean = value;
+  return point;
 }
 
 TEST(CurveTest, IsTakenOverTheStretchThatAllSeedsShare) {
@@ -75,23 +81,40 @@ TEST(CurveTest, ALongRunIsReadOffAtAFixedNumberOfPlaces) {
   EXPECT_EQ(curve.mean.back(), 1000);
 }
 
+// A curve of two places.
+CurvePlot PlotOf(const std::string& title, int seeds) {
+  CurvePlot plot;
+  plot.file = "x.svg";
+  plot.title = title;
+  plot.lines = {{"a_b", 0, {{1, 2}, {1, 2}, {0, 1}, {2, 3}, seeds}}};
+  return plot;
+}
+
+BarPlot PlotOf(const std::optional<Estimate>& ours) {
+  BarPlot plot;
+  plot.file = "x.svg";
+  plot.panels = {{"Hopper", "return", {{"DBR", std::nullopt, ours}}}};
+  return plot;
+}
+
 TEST(PlotScriptTest, LabelsAreTextWhateverTheyHold) {
-  CurvePlot plot = {.file = "x.svg", .title = "it's `date`\nset output 'y'", .x_label = "x", .y_label = "y"};
-  plot.lines = {{.label = "a_b", .curve = {{1, 2}, {1, 2}, {0, 1}, {2, 3}, 2}}};
-  EXPECT_THAT(Script(plot), HasSubstr("set title 'it''s `date` set output ''y'''"));
+  EXPECT_THAT(Script(PlotOf("it's `date`\nset output 'y'", 2)),
+              HasSubstr("set title 'it''s `date` set output ''y'''"));
 }
 
 TEST(PlotScriptTest, ThereIsNoPlotOfNothing) {
-  EXPECT_EQ(Script(CurvePlot{.lines = {{.label = "DBR"}}}), "");
-  EXPECT_EQ(Script(BarPlot{.panels = {{"Hopper", "return", {{"DBR", {}, {}}}}}}), "");
+  CurvePlot plot = PlotOf("a", 2);
+  plot.lines[0].curve = Curve();
+  EXPECT_EQ(Script(plot), "");
+  EXPECT_EQ(Script(PlotOf(std::nullopt)), "");
 }
 
 TEST(PlotScriptTest, OneSeedHasNeitherBandNorWhisker) {
-  CurvePlot plot = {.file = "x.svg"};
-  plot.lines = {{.label = "DBR", .curve = {{1, 2}, {1, 2}, {1, 2}, {1, 2}, 1}}};
-  EXPECT_THAT(Script(plot), Not(HasSubstr("filledcurves")));
-  BarPlot bars = {.file = "x.svg", .panels = {{"Hopper", "return", {{"DBR", {}, Estimate{.value = 3}}}}}};
-  EXPECT_THAT(Script(bars), AllOf(HasSubstr("with boxes"), Not(HasSubstr("yerrorbars"))));
+  EXPECT_THAT(Script(PlotOf("a", 2)), HasSubstr("filledcurves"));
+  EXPECT_THAT(Script(PlotOf("a", 1)), Not(HasSubstr("filledcurves")));
+  EXPECT_THAT(Script(PlotOf(Estimate{.value = 3, .low = 2, .high = 4})), HasSubstr("yerrorbars"));
+  EXPECT_THAT(Script(PlotOf(Estimate{.value = 3})),
+              AllOf(HasSubstr("with boxes"), Not(HasSubstr("yerrorbars"))));
 }
 
 TEST(GnuplotTest, AScriptThatFailsIsReportedWithItsLastWords) {

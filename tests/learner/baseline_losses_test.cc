@@ -149,7 +149,8 @@ TEST(WeightedLikelihoodTest, GradientMatchesDifferencesWithTheWeightsConstant) {
     return likelihood.loss();
   };
   const Matrix start = network.parameters();
-  EXPECT_NEAR(loss(start), -weights.dot(likelihood.log_prob()) / kStates, 1e-12);
+  const double at_start = loss(start);
+  EXPECT_NEAR(at_start, -weights.dot(likelihood.log_prob()) / kStates, 1e-12);
   const Matrix gradient = network.gradient();
   ExpectIsGradient(gradient, loss, start);
 }

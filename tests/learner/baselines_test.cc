@@ -156,7 +156,7 @@ TEST(Awac, NoWeightPassesItsLimit) {
 // One state, one step, one dimension; the actions are given, the reward is a function of them.
 class Bandit : public testing::Test {
  protected:
-  static constexpr int kActions = 64;
+  static constexpr int kActions = 32, kUpdates = 1200;
 
   static AlgorithmSpec Spec(AlgorithmConfig::AlgorithmCase algorithm) {
     AlgorithmSpec spec = BaselineSpec(algorithm);
@@ -164,12 +164,13 @@ class Bandit : public testing::Test {
     spec.actions.size = 1;
     spec.hidden_sizes = {32, 32};
     spec.config.set_learning_rate(3e-3);
+    spec.config.set_learning_rate_decay_updates(kUpdates);
     return spec;
   }
 
   // Trains on all actions at once; leaves the policy's Gaussian before the tanh in mean_, deviation_.
   template <class Reward>
-  void Train(const AlgorithmSpec& spec, const VectorX<float>& actions, const Reward& reward, int updates) {
+  void Train(const AlgorithmSpec& spec, const VectorX<float>& actions, const Reward& reward) {
     Batch batch;
     batch.Resize({1, 1, 0}, actions.size(), /*with_keys=*/false);
     batch.observations.setOnes();
@@ -178,7 +179,7 @@ class Bandit : public testing::Test {
     batch.actions = actions.transpose();
     for (Eigen::Index j = 0; j < actions.size(); ++j) batch.rewards[j] = reward(actions[j]);
     algorithm_ = Make(spec);
-    for (int i = 0; i < updates; ++i) ASSERT_TRUE(algorithm_->Update({batch, batch, batch}).ok());
+    for (int i = 0; i < kUpdates; ++i) ASSERT_TRUE(algorithm_->Update({batch, batch, batch}).ok());
     PolicySnapshot snapshot;
     algorithm_->ExportPolicy(&snapshot);
     MlpActivations<float> activations;
@@ -211,7 +212,7 @@ class Bandit : public testing::Test {
 
 TEST_F(Bandit, Td3FindsTheBestAction) {
   const auto reward = [](float a) { return -(a - 0.4f) * (a - 0.4f); };
-  Train(Spec(AlgorithmConfig::kTd3), UniformActions(), reward, 1500);
+  Train(Spec(AlgorithmConfig::kTd3), UniformActions(), reward);
   EXPECT_NEAR(std::tanh(mean_), 0.4, 0.05);
 }
 
@@ -221,7 +222,7 @@ TEST_F(Bandit, AwacFitsTheDataWeightedByItsAdvantages) {
   spec.config.mutable_awac()->set_temperature(0.02);
   spec.config.mutable_awac()->set_value_samples(4);
   const auto reward = [](float a) { return -(a - 0.4f) * (a - 0.4f); };
-  Train(spec, UniformActions(), reward, 1500);
+  Train(spec, UniformActions(), reward);
   EXPECT_NEAR(std::tanh(mean_), 0.4, 0.05);
   EXPECT_NEAR(deviation_, 0.1 / (1 - 0.4 * 0.4), 0.04);  // 0.1, through the slope of atanh
 }
@@ -230,7 +231,7 @@ TEST_F(Bandit, AwacsLikelihoodOfASingleActionStaysBounded) {
   AlgorithmSpec spec = Spec(AlgorithmConfig::kAwac);
   spec.config.mutable_awac()->set_max_weight(1);
   const auto reward = [](float) { return 0.5f; };
-  Train(spec, VectorX<float>::Constant(kActions, 0.3f), reward, 1500);
+  Train(spec, VectorX<float>::Constant(kActions, 0.3f), reward);
   EXPECT_NEAR(std::tanh(mean_), 0.3, 0.01);
   // At the lower limit of the log-std, at the mean itself: the density's greatest logarithm.
   const double greatest = 5 - 0.9189 - std::log(1 - 0.3 * 0.3);
@@ -243,7 +244,7 @@ TEST_F(Bandit, BracTradesRewardForDivergence) {
   AlgorithmSpec spec = Spec(AlgorithmConfig::kBrac);
   spec.config.mutable_brac()->set_first_multiplier(0.5);
   const auto reward = [](float a) { return std::atanh(a); };
-  Train(spec, NormalActions(0.5), reward, 1500);
+  Train(spec, NormalActions(0.5), reward);
   EXPECT_NEAR(mean_, 0.5, 0.1);
   EXPECT_NEAR(deviation_, 0.5, 0.1);
   EXPECT_NEAR(Metric(*algorithm_, "train/divergence"), 0.5, 0.2);  // mean^2 / (2 * 0.5^2)
@@ -256,7 +257,7 @@ TEST_F(Bandit, BracsAdaptiveMultiplierHoldsTheDivergenceAtEpsilon) {
   spec.config.mutable_brac()->set_epsilon(0.5);
   spec.config.mutable_brac()->set_multiplier_learning_rate(0.01);
   const auto reward = [](float a) { return 3 * std::atanh(a); };
-  Train(spec, NormalActions(0.5), reward, 2000);
+  Train(spec, NormalActions(0.5), reward);
   EXPECT_NEAR(mean_, 0.5, 0.1);
   EXPECT_NEAR(deviation_, 0.5, 0.1);
   EXPECT_NEAR(Metric(*algorithm_, "train/multiplier"), 3 * 0.5 * 0.5 / 0.5, 0.5);

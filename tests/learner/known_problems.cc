@@ -123,7 +123,7 @@ MatrixX<float> TrainedOnProblem::Act(ActingMode mode) {
 
 MatrixX<float> TrainedOnProblem::Output(const std::string& network, const MatrixX<float>& input,
                                         const MlpShape& shape) const {
-  const std::vector<float>* parameters = snapshot().Find(network);
+  const std::vector<float>* parameters = policy_->snapshot().Find(network);
   EXPECT_NE(parameters, nullptr) << network;
   MlpActivations<float> activations;
   return MlpForward<float>(shape, parameters->data(), input, &activations);

@@ -36,8 +36,7 @@ class TrainedOnProblem {
   TrainedOnProblem(const KnownProblem& problem, const AlgorithmConfig& config, int updates);
 
   const Algorithm& algorithm() const { return *algorithm_; }
-  const PolicySnapshot& snapshot() const { return policy_->snapshot(); }
-  bool has_behavior() const { return policy_->has_behavior(); }
+  bool Has(const std::string& network) const { return policy_->snapshot().Find(network) != nullptr; }
 
   // The action in each state [1 x states] by `mode`.
   MatrixX<float> Act(ActingMode mode);

@@ -124,7 +124,7 @@ TEST_P(MaskedProblems, AnIllegalActionIsNeitherTakenNorCounted) {
   EXPECT_NEAR(trained.Value(0, kStay), 0.95, kDiscreteTolerance);
   EXPECT_EQ(trained.Act(MODE)(0, 1), kFeast);
   for (const ActingMode mode : {SAMPLE, MODE, GREEDY_Q, SUPPORT}) {
-    if (mode == SUPPORT && !trained.has_behavior()) continue;
+    if (mode == SUPPORT && !trained.Has(kBetaMinus)) continue;
     for (int i = 0; i < 100; ++i) EXPECT_NE(trained.Act(mode)(0, 0), kFeast);
   }
 }
