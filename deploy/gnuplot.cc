@@ -2,7 +2,6 @@
 
 #include <poll.h>
 #include <signal.h>
-#include <sys/pidfd.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -22,6 +21,10 @@
 #include "core/status_macros.h"
 #include "deploy/child_process.h"
 #include "deploy/log_tail.h"
+
+extern "C" {  // which the header of glibc 2.36 leaves out
+#include <sys/pidfd.h>
+}
 
 namespace dbr {
 namespace {

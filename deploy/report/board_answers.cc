@@ -14,13 +14,10 @@
 namespace dbr::report {
 namespace {
 
-// The network that a snapshot of BEAR's holds beside the policy.
-constexpr char kBehaviorNetwork[] = "behavior";
-
 // What the behaviour policy gives the board, as the policy of a snapshot of its own; empty where there is
 // none of the policy's shape (over discrete actions both are a softmax over the legal ones).
 std::vector<float> AskBehavior(const PolicyNetworks& policy, const connect4::Board& board) {
-  const std::vector<float>* behavior = policy.snapshot().Find(kBehaviorNetwork);
+  const std::vector<float>* behavior = policy.snapshot().Find(kBehavior);
   if (behavior == nullptr) return {};
   PolicySnapshot alone = policy.snapshot();
   alone.networks = {{kPolicyNetwork, *behavior}};
