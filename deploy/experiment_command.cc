@@ -21,7 +21,7 @@
 namespace dbr {
 namespace {
 
-constexpr int kStateCells = 20;
+constexpr int kStateCells = 24;
 
 struct ExperimentFlags {
   std::string grid;

@@ -145,7 +145,7 @@ TEST_F(ExperimentTest, AnOfflineCellNeedsItsSeedBufferAndStartsNoActors) {
   ASSERT_EQ(status, 0) << output;
   std::tie(status, output) = Experiment({"--only", "hopper-random", "--dry-run"});
   EXPECT_EQ(status, 0) << output;
-  EXPECT_THAT(output, HasSubstr("to start            hopper-random/dbr/seed-1  1 core\n"));
+  EXPECT_THAT(output, HasSubstr("to start                hopper-random/dbr/seed-1  1 core\n"));
   EXPECT_FALSE(std::filesystem::exists(runs_));
   std::tie(status, output) = Experiment(only);
   EXPECT_EQ(status, 0) << output;

@@ -155,7 +155,7 @@ TEST_P(Conformance, AcceptsABatchOfOneAndEmptyPartitions) {
 // Makes an action that is illegal everywhere be worth 10^6 in every network: nothing else changes, to the
 // last bit, and no mode plays it.
 TEST_P(Conformance, AnIllegalActionIsNeitherLearnedFromNorChosen) {
-  if (GetParam().actions != ActionKind::kDiscrete) GTEST_SKIP() << "every action is legal";
+  if (GetParam().id.actions != ActionKind::kDiscrete) GTEST_SKIP() << "every action is legal";
   constexpr int kIllegal = 2;
   PolicySnapshot snapshot;
   algorithm_->ExportPolicy(&snapshot);

@@ -79,8 +79,8 @@ TEST(ParseConfigTest, ReportsEveryErrorAtOnceWithItsPlace) {
                {"actor.envz=3"}),
       ElementsAre("1:1: sed: unknown field; did you mean 'seed'?",
                   "3:3: algorithm.discont: unknown field; did you mean 'discount'?",
-                  "4:21: algorithm.dbr.constraint: expected one of DYNAMIC_MAX, DYNAMIC_MIN, FIXED, found "
-                  "'FIXD'; did you mean 'FIXED'?",
+                  "4:21: algorithm.dbr.constraint: expected one of DYNAMIC_MAX, DYNAMIC_MIN, FIXED, NONE, "
+                  "found 'FIXD'; did you mean 'FIXED'?",
                   StartsWith("4:26: algorithm.dbr.nonsense: unknown field; known: constraint, divergence,"),
                   "6:20: replay.capacity: expected a whole number of 0 to 18446744073709551615, found '-1'",
                   "--set actor.envz: unknown field; did you mean 'envs'?",
@@ -144,11 +144,10 @@ TEST(ParseConfigTest, NoNumberOfTheSchemaMayBeInfinite) {
 }
 
 TEST(OverrideTest, SetsFieldsByTheirPath) {
-  const Config config =
-      Parsed("algorithm { dbr { constraint: FIXED epsilon: 0.2 } } env { opponents: \"random\" }",
-             {"algorithm.dbr.epsilon=0.1", "env.opponents=[one_ply, \"mcts:10\"]", "network.hidden_sizes=64",
-              "actor.mode=SUPPORT", "learner.address=unix:/run/a=b.sock", "replay.seed.evict=true",
-              "seed = 9"});
+  const Config config = Parsed(
+      "algorithm { dbr { constraint: FIXED epsilon: 0.2 } } env { opponents: \"random\" }",
+      {"algorithm.dbr.epsilon=0.1", "env.opponents=[one_ply, \"mcts:10\"]", "network.hidden_sizes=64",
+       "actor.mode=SUPPORT", "learner.address=unix:/run/a=b.sock", "replay.seed.evict=true", "seed = 9"});
   EXPECT_EQ(config.algorithm().dbr().constraint(), DbrConfig::FIXED);
   EXPECT_EQ(config.algorithm().dbr().epsilon(), 0.1);
   EXPECT_THAT(config.env().opponents(), ElementsAre("one_ply", "mcts:10"));
