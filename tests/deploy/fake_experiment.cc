@@ -34,35 +34,33 @@ RunSummary Finished(std::uint64_t seed) {
 }  // namespace
 
 std::string FakeGrid() {
-  return R"(
+  return R"grid(
 name: "fake"
 task {
-  name: "hopper-medium" label: "Hopper (offline, medium)" kind : OFFLINE measure {
-    published{contender : "dbr" mean : 17.3 std : 6} published {
-    contender:
-      "bear" mean : 16.1 std : 2.97
-    }
+  name: "hopper-medium"
+  label: "Hopper (offline, medium)"
+  kind: OFFLINE
+  measure {
+    published { contender: "dbr" mean: 17.3 std: 6 }
+    published { contender: "bear" mean: 16.1 std: 2.97 }
   }
 }
 task {
-name:
-  "connect4" label : "Connect 4" kind : GAMES measure {
-  label:
-    "Connect 4 - random" opponent : "random" published {
-    contender:
-      "dbr" mean : 0.982 std : 0.0158
-    }
-  }
+  name: "connect4"
+  label: "Connect 4"
+  kind: GAMES
   measure {
-  label:
-    "Connect 4 - MCTS 10" opponent : "mcts:10"
+    label: "Connect 4 - random"
+    opponent: "random"
+    published { contender: "dbr" mean: 0.982 std: 0.0158 }
   }
+  measure { label: "Connect 4 - MCTS 10" opponent: "mcts:10" }
 }
 contender { name: "dbr" label: "DBR" task: "*" }
 contender { name: "bear" label: "BEAR" task: "*" }
 contender { name: "dbr-fixed" label: "ARM <fixed>" task: "hopper-*" ablation_of: "dbr" }
 scale { name: "short" seeds: 2 }
-)";
+)grid";
 }
 
 void WriteFakeExperiment(const std::string& root) {
