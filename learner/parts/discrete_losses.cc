@@ -146,8 +146,9 @@ PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, cons
   const Scalar divergence_minus = workspace->minus.mean();
   const Threshold<Scalar> threshold =
       ThresholdOf(options.constraint, static_cast<Scalar>(options.epsilon), divergence_minus);
+  const Scalar weight = options.constraint == DbrConfig::NONE ? Scalar{0} : alpha;
   const ConstrainedLoss<Scalar> loss = ConstrainedPolicyLoss<Scalar>(
-      options, {policy, q1, q2}, {beta_plus, threshold.value, alpha}, workspace, d_logits);
+      options, {policy, q1, q2}, {beta_plus, threshold.value, weight}, workspace, d_logits);
   if (options.repel_negative && threshold.moved_by_minus) {
     SoftmaxGradient(policy, &workspace->d_minus);
     *d_logits -= alpha / static_cast<Scalar>(policy.probabilities.cols()) * workspace->d_minus;

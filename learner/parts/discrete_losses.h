@@ -77,7 +77,7 @@ ConstrainedLoss<Scalar> ConstrainedPolicyLoss(const PolicyLossOptions& options,
                                               MatrixX<Scalar>* d_logits);
 
 // DBR's policy loss: -E[min_i sum_a pi Q_i] / scale - w H(pi) + alpha * (D(pi, beta+) - c), c by
-// options.constraint (docs/algorithms.md, DBR step 3; with NONE alpha has to be 0), and its gradient with
+// options.constraint (docs/algorithms.md, DBR step 3; NONE leaves that term out), and its gradient with
 // respect to the policy's logits. q1, q2, beta+, beta- and the scale are constants; so is c unless
 // repel_negative.
 template <class Scalar>

@@ -251,7 +251,8 @@ TEST_F(ActorTest, ADrawnReturnIsThatOfItsEpisode) {
       if (next == column_of.end()) continue;
       behind = rows.returns[next->second];
     }
-    EXPECT_NEAR(rows.returns[i], rows.rewards[i] + rows.discounts[i] * behind, 1e-4);
+    const double expected = rows.rewards[i] + rows.discounts[i] * behind;
+    EXPECT_NEAR(rows.returns[i], expected, 1e-6 * (1 + std::abs(expected)));  // of a float's digits
     ++compared;
   }
   EXPECT_GT(compared, 800);

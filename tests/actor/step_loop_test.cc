@@ -185,9 +185,11 @@ TEST(StepLoopTest, WithReturnsEpisodesGoOutWholeAndBootstrapByTheCriticWhereThey
     for (std::size_t t = last + 1; t-- > first;) {
       EXPECT_EQ(seen[t].step(), static_cast<float>(t - first));
       value = seen[t].reward + kDiscount * value;
-      EXPECT_NEAR(seen[t].monte_carlo_return, value, 1e-4);
-      EXPECT_NEAR(seen[t].advantage, kScale * value - ValueOf(*policy, seen[t].observation, seen[t].mask),
-                  1e-3);
+      const double state_value = ValueOf(*policy, seen[t].observation, seen[t].mask);
+      constexpr double kDigits = 1e-6;  // of a float
+      EXPECT_NEAR(seen[t].monte_carlo_return, value, kDigits * (1 + std::abs(value)));
+      EXPECT_NEAR(seen[t].advantage, kScale * value - state_value,
+                  kDigits * (1 + kScale * std::abs(value) + std::abs(state_value)));
     }
     first = last + 1;
   }

@@ -184,7 +184,7 @@ TEST_P(Conformance, AnIllegalActionIsNeitherLearnedFromNorChosen) {
   MatrixX<float> actions(1, 16), masks = MatrixX<float>::Ones(3, 16);
   masks.row(kIllegal).setZero();
   for (const ActingMode mode : {SAMPLE, MODE, GREEDY_Q, SUPPORT}) {
-    if (mode == SUPPORT && !(*policy)->has_behavior()) continue;
+    if (mode == SUPPORT && !(*policy)->has_dual_behavior()) continue;
     ASSERT_TRUE(runner.Act(**policy, mode, Random(16).observations, masks, rng_, actions).ok());
     EXPECT_LT(actions.maxCoeff(), kIllegal);
   }
