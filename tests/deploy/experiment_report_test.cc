@@ -114,7 +114,7 @@ TEST_F(ReportTest, ADamagedSummaryIsNamedAndTheOthersAreReported) {
   ASSERT_TRUE(WriteFileAtomically(path, "{\"env\": \"hop").ok());
   EXPECT_THAT(Write().notes, Contains(AllOf(HasSubstr(path), HasSubstr("no JSON"))));
   const std::string text = Output("report.md");
-  EXPECT_THAT(text, HasSubstr("| 1120.0 (one seed) |"));
+  EXPECT_THAT(text, HasSubstr("| **1120.0 (one seed)** |"));
   EXPECT_THAT(text, HasSubstr("1 of 2: 1 failed"));
 }
 
@@ -202,7 +202,7 @@ TEST_F(ReportTest, PicturesHoldTheirLabels) {
   EXPECT_THAT(Output("plots/bars-offline--medium-data.svg"),
               AllOf(HasSubstr("published"), HasSubstr("BEAR")));
   EXPECT_THAT(Output("plots/ablations-dbr.svg"),
-              AllOf(HasSubstr("ARM &lt;fixed&gt;"), HasSubstr("95% interval")));
+              AllOf(HasSubstr("ARM &lt;fixed>"), HasSubstr("95% interval")));
   EXPECT_THAT(Output("plots/ablation-curves-dbr-hopper-medium.svg"), HasSubstr("DBR"));
   EXPECT_THAT(Output("plots/board.svg"), HasSubstr("column 7 must be blocked"));
   const std::string page = Output("report.html"), text = Output("report.md");
