@@ -89,7 +89,7 @@ struct Side {
     if (whiskers.empty()) return;
     absl::StrAppend(data, "$w", name, " << EOD\n", whiskers, "EOD\n");
     elements->push_back(absl::StrFormat(
-        "$w%s using ($1%+.2f):2:3:4 with yerrorbars pt -1 lw 1.3 lc rgb '#222222' notitle", name, shift));
+        "$w%s using ($1%+.2f):2:3:4 with yerrorbars pt 0 lw 1.3 lc rgb '#222222' notitle", name, shift));
   }
 };
 
