@@ -7,9 +7,9 @@
 #include "absl/status/status.h"
 #include "core/rng.h"
 #include "learner/algorithm.h"
+#include "learner/parts/actor_critic_state.h"
 #include "learner/parts/learning_rate.h"
 #include "learner/parts/pair_runner.h"
-#include "learner/parts/policy_export.h"
 #include "learner/parts/trained_network.h"
 #include "learner/parts/twin_critic.h"
 
@@ -46,22 +46,15 @@ struct ActorCriticNetworks {
         (behavior_value - state_value).template cast<float>();
   }
 
-  void Export(PolicySnapshot* snapshot) const {
-    BeginExport(spec, snapshot);
-    ExportNetwork(kPolicyNetwork, policy.parameters(), snapshot);
-    ExportNetwork(kCritic1, critics.first().parameters(), snapshot);
-    ExportNetwork(kCritic2, critics.second().parameters(), snapshot);
-  }
+  void Export(PolicySnapshot* snapshot) const { ExportActorCritic(spec, policy, critics, snapshot); }
 
   void Save(TensorFile* file) const {
-    policy.Save(kPolicyNetwork, file);
-    critics.Save(file);
+    SaveActorCritic(policy, critics, file);
     PutRng(AlgorithmName(spec.config) + ".rng", rng, file);
     PutCounter(AlgorithmName(spec.config) + ".updates", updates, file);
   }
   absl::Status Load(const TensorFile& file) {
-    absl::Status status = policy.Load(kPolicyNetwork, file);
-    status.Update(critics.Load(file));
+    absl::Status status = LoadActorCritic(file, &policy, &critics);
     status.Update(GetRng(AlgorithmName(spec.config) + ".rng", file, &rng));
     status.Update(GetCounter(AlgorithmName(spec.config) + ".updates", file, &updates));
     return status;

@@ -8,11 +8,11 @@
 #include "absl/status/status.h"
 #include "core/rng.h"
 #include "learner/algorithm.h"
+#include "learner/parts/actor_critic_state.h"
 #include "learner/parts/dual_behavior.h"
 #include "learner/parts/learning_rate.h"
 #include "learner/parts/multiplier.h"
 #include "learner/parts/pair_runner.h"
-#include "learner/parts/policy_export.h"
 #include "learner/parts/trained_network.h"
 #include "learner/parts/twin_critic.h"
 #include "learner/parts/update_metrics.h"
@@ -72,21 +72,16 @@ struct BearNetworks {
   }
 
   void Export(const AlgorithmSpec& spec, PolicySnapshot* snapshot) const {
-    BeginExport(spec, snapshot);
-    ExportNetwork(kPolicyNetwork, policy.parameters(), snapshot);
-    ExportNetwork(kCritic1, critics.first().parameters(), snapshot);
-    ExportNetwork(kCritic2, critics.second().parameters(), snapshot);
+    ExportActorCritic(spec, policy, critics, snapshot);
   }
 
   void Save(TensorFile* file) const {
-    policy.Save(kPolicyNetwork, file);
-    critics.Save(file);
+    SaveActorCritic(policy, critics, file);
     multiplier.Save(file);
     PutCounter("bear.updates", updates, file);
   }
   absl::Status Load(const TensorFile& file) {
-    absl::Status status = policy.Load(kPolicyNetwork, file);
-    status.Update(critics.Load(file));
+    absl::Status status = LoadActorCritic(file, &policy, &critics);
     status.Update(multiplier.Load(file));
     status.Update(GetCounter("bear.updates", file, &updates));
     return status;

@@ -8,6 +8,7 @@
 
 #include "absl/status/status.h"
 #include "learner/algorithm.h"
+#include "learner/parts/actor_critic_state.h"
 #include "learner/parts/dual_behavior.h"
 #include "learner/parts/learning_rate.h"
 #include "learner/parts/multiplier.h"
@@ -92,26 +93,21 @@ struct DualBehaviorNetworks {
   }
 
   void Export(const AlgorithmSpec& spec, PolicySnapshot* snapshot) const {
-    BeginExport(spec, snapshot);
+    ExportActorCritic(spec, policy, critics, snapshot);
     snapshot->support_epsilon = static_cast<float>(spec.config.dbr().epsilon());
-    ExportNetwork(kPolicyNetwork, policy.parameters(), snapshot);
-    ExportNetwork(kCritic1, critics.first().parameters(), snapshot);
-    ExportNetwork(kCritic2, critics.second().parameters(), snapshot);
     ExportNetwork(kBetaPlus, beta_plus.parameters(), snapshot);
     ExportNetwork(kBetaMinus, beta_minus.parameters(), snapshot);
   }
 
   void Save(TensorFile* file) const {
-    policy.Save(kPolicyNetwork, file);
-    critics.Save(file);
+    SaveActorCritic(policy, critics, file);
     beta_plus.Save(kBetaPlus, file);
     beta_minus.Save(kBetaMinus, file);
     multiplier.Save(file);
     PutCounter("dbr.updates", updates, file);
   }
   absl::Status Load(const TensorFile& file) {
-    absl::Status status = policy.Load(kPolicyNetwork, file);
-    status.Update(critics.Load(file));
+    absl::Status status = LoadActorCritic(file, &policy, &critics);
     status.Update(beta_plus.Load(kBetaPlus, file));
     status.Update(beta_minus.Load(kBetaMinus, file));
     status.Update(multiplier.Load(file));
