@@ -13,8 +13,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-
 Json Number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);
 }
