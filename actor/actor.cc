@@ -25,7 +25,7 @@ constexpr std::uint64_t kEvaluatorStream = 1 << 19;  // of the config's seed
 constexpr std::size_t kBufferedSteps = 16;           // of each environment, where the config leaves it open
 constexpr absl::Duration kStopCheck = absl::Milliseconds(100);
 constexpr absl::Duration kReportTimeout = absl::Seconds(5);
-constexpr absl::Duration kStatsTimeout = absl::Seconds(2);
+constexpr absl::Duration kStatsTimeout = absl::Seconds(5);
 
 Rng ActorRng(const ActorOptions& options) {
   return Rng(options.config.seed()).Fork(kActorStream + options.index);

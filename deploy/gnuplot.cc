@@ -2,6 +2,7 @@
 
 #include <poll.h>
 #include <signal.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -21,10 +22,6 @@
 #include "core/status_macros.h"
 #include "deploy/child_process.h"
 #include "deploy/log_tail.h"
-
-extern "C" {  // which the header of glibc 2.36 leaves out
-#include <sys/pidfd.h>
-}
 
 namespace dbr {
 namespace {
@@ -60,7 +57,8 @@ absl::Status RunGnuplot(absl::string_view script, const std::string& folder, abs
   ASSIGN_OR_RETURN(const StartedChild child, StartChild({.command = {program, script_path}, .log = log}));
   std::atomic<bool> interrupted = false;
   bool in_time = false;
-  const int pidfd = pidfd_open(child.pid, 0);
+  // By number: glibc 2.36 declares pidfd_open() for C alone.
+  const int pidfd = static_cast<int>(syscall(SYS_pidfd_open, child.pid, 0));
   if (pidfd >= 0) {
     const absl::Cleanup close_pidfd = [pidfd] { close(pidfd); };
     const ShutdownWatcher watcher([&interrupted, &child] {

@@ -75,8 +75,8 @@ struct Side {
     if (!estimate.has_value()) return;
     absl::StrAppendFormat(&bars, "%u %.6g\n", place, estimate->value);
     if (std::isfinite(estimate->low))
-      absl::StrAppendFormat(&whiskers, "%u %.6g %.6g %.6g\n", place, estimate->value, estimate->low,
-                            estimate->high);
+      absl::StrAppendFormat(&whiskers, "%u %.6g %.6g\n", place, estimate->low,
+                            estimate->high - estimate->low);
   }
   // Appends the blocks named after `name` to `data` and their elements to `elements`.
   void Draw(const std::string& name, double shift, const std::string& colour, const std::string& label,
@@ -88,8 +88,10 @@ struct Side {
                         shift, colour, Quoted(label)));
     if (whiskers.empty()) return;
     absl::StrAppend(data, "$w", name, " << EOD\n", whiskers, "EOD\n");
-    elements->push_back(absl::StrFormat(
-        "$w%s using ($1%+.2f):2:3:4 with yerrorbars pt 0 lw 1.3 lc rgb '#222222' notitle", name, shift));
+    elements->push_back(
+        absl::StrFormat("$w%s using ($1%+.2f):2:(0):3 with vectors heads size screen 0.004,90 lw 1.3 lc rgb "
+                        "'#222222' notitle",
+                        name, shift));
   }
 };
 
@@ -108,7 +110,7 @@ std::string PanelScript(const BarPlot& plot, const BarPanel& panel) {
   ours.Draw("o", pairs ? kBarWidth / 2 : 0.0, kColours[0], plot.our_label, &script, &elements);
   absl::StrAppend(&script, "set title ", Quoted(panel.title), "\nset ylabel ", Quoted(panel.y_label),
                   "\nset xtics (", absl::StrJoin(tics, ", "),
-                  ") rotate by -35\nset xrange [-0.6:", static_cast<double>(panel.bars.size()) - 0.4,
+                  ") rotate by 35 right\nset xrange [-0.6:", static_cast<double>(panel.bars.size()) - 0.4,
                   "]\nplot ", absl::StrJoin(elements, ", "), "\n");
   return script;
 }
@@ -150,10 +152,10 @@ std::string Script(const BarPlot& plot) {
   if (panels.empty()) return "";
   const int columns = panels.size() == 1 ? 1 : 2;
   const int rows = (static_cast<int>(panels.size()) + columns - 1) / columns;
-  std::string script = absl::StrCat(Begin(plot.file, columns == 1 ? 620 : 1000, 360 * rows),
-                                    "set multiplot layout ", rows, ",", columns, "\nset boxwidth ", kBarWidth,
-                                    "\nset xzeroaxis lt 1 lw 1 lc rgb '#444444'\nset yrange [*<0:0<*]\n",
-                                    "set key outside bottom center horizontal samplen 1.5\nset lmargin 11\n");
+  std::string script = absl::StrCat(
+      Begin(plot.file, columns == 1 ? 620 : 1040, 380 * rows), "set multiplot layout ", rows, ",", columns,
+      "\nset boxwidth ", kBarWidth, "\nset xzeroaxis lt 1 lw 1 lc rgb '#444444'\nset yrange [*<0:0<*]\n",
+      "set key outside top center samplen 1 font ',12'\nset lmargin 11\nset rmargin 3\n");
   for (const BarPanel* panel : panels) script += PanelScript(plot, *panel);
   return script + "unset multiplot\n";
 }

@@ -32,16 +32,16 @@ std::string ListText(const Message& message, const FieldDescriptor& field) {
   return text + "]";
 }
 
-// Appends the fields of `message` that differ from those of `defaults`, a message that sets none. A member of
-// a oneof that is set counts even where all within it is at its default.
+// Appends the fields of `message` that differ from those of `defaults`. A member of a oneof that is set
+// counts even where all within it is at its default.
 void AppendDifferences(const Message& message, const Message& defaults, const std::string& path,
                        std::string* lines) {
   for (int i = 0; i < message.GetDescriptor()->field_count(); ++i) {
     const FieldDescriptor& field = *message.GetDescriptor()->field(i);
     const std::string name = JoinPath(path, field.name());
     if (field.is_repeated()) {
-      if (message.GetReflection()->FieldSize(message, &field) > 0)
-        absl::StrAppend(lines, name, ": ", ListText(message, field), "\n");
+      const std::string list = ListText(message, field);
+      if (list != ListText(defaults, field)) absl::StrAppend(lines, name, ": ", list, "\n");
       continue;
     }
     if (!message.GetReflection()->HasField(message, &field)) continue;
@@ -57,6 +57,12 @@ void AppendDifferences(const Message& message, const Message& defaults, const st
   }
 }
 
+// The effective config of an empty one.
+const Config& DefaultConfig() {
+  static const auto* config = new Config(ParseConfig(PrintConfig(Config())).value());
+  return *config;
+}
+
 }  // namespace
 
 Settings SettingsOf(const Config& config) {
@@ -64,7 +70,7 @@ Settings SettingsOf(const Config& config) {
   seedless.clear_seed();
   const std::string effective = PrintConfig(seedless);
   Settings settings;
-  AppendDifferences(seedless, Config::default_instance(), "", &settings.differences);
+  AppendDifferences(seedless, DefaultConfig(), "", &settings.differences);
   settings.digest = absl::StrFormat("%08x", Crc32c(effective.data(), effective.size()));
   return settings;
 }

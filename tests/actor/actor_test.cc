@@ -317,6 +317,37 @@ TEST_F(ActorTest, EndsWithTheErrorOfAReplayServerForSomethingElse) {
   EXPECT_THAT(std::string(status.message()), HasSubstr("observation_width"));
 }
 
+TEST_F(ActorTest, AnActorThatStartsLaterGoesOnWithTheEpsilonOfTheRun) {
+  config_.mutable_replay()->set_samples_per_insert(0);
+  config_.mutable_replay()->set_capacity(2000);
+  config_.mutable_actor()->set_mode(MODE);
+  config_.mutable_actor()->set_epsilon(1);
+  config_.mutable_actor()->set_final_epsilon(0);
+  const auto server = StartReplay(Connect4Spec());
+  LearnerDouble learner(learner_address_);
+  learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
+  const auto act_until = [&](std::uint64_t inserted) {
+    const auto actor = MakeActor();
+    RunningActor running(actor.get());
+    EXPECT_TRUE(AwaitInserted(inserted));
+    EXPECT_TRUE(running.Stop().ok());
+  };
+  act_until(30000);
+  const std::uint64_t inserted = server->buffer().Stats().inserted;
+  config_.mutable_actor()->set_epsilon_decay_steps(inserted);
+  act_until(inserted + 2000);
+
+  DrawnBatches drawn;
+  ASSERT_TRUE(client_->Sample({.uniform = kDrawn}, TransitionLayout::Of(Connect4Spec()), kLong, &drawn).ok());
+  MatrixX<float> best(1, kDrawn);
+  Rng unused(1);
+  ASSERT_TRUE(PolicyRunner()
+                  .Act(*UntrainedPolicy(Connect4Spec(), 1), MODE, drawn.uniform.observations,
+                       drawn.uniform.masks, unused, best)
+                  .ok());
+  EXPECT_EQ(drawn.uniform.actions, best);
+}
+
 TEST_F(ActorTest, RefusesNoiseOnDiscreteActions) {
   config_.mutable_actor()->set_action_noise(0.1);
   const absl::Status status =

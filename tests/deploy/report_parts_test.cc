@@ -112,9 +112,9 @@ TEST(PlotScriptTest, ThereIsNoPlotOfNothing) {
 TEST(PlotScriptTest, OneSeedHasNeitherBandNorWhisker) {
   EXPECT_THAT(Script(PlotOf("a", 2)), HasSubstr("filledcurves"));
   EXPECT_THAT(Script(PlotOf("a", 1)), Not(HasSubstr("filledcurves")));
-  EXPECT_THAT(Script(PlotOf(Estimate{.value = 3, .low = 2, .high = 4})), HasSubstr("yerrorbars"));
+  EXPECT_THAT(Script(PlotOf(Estimate{.value = 3, .low = 2, .high = 4})), HasSubstr("with vectors"));
   EXPECT_THAT(Script(PlotOf(Estimate{.value = 3})),
-              AllOf(HasSubstr("with boxes"), Not(HasSubstr("yerrorbars"))));
+              AllOf(HasSubstr("with boxes"), Not(HasSubstr("with vectors"))));
 }
 
 TEST(GnuplotTest, AScriptThatFailsIsReportedWithItsLastWords) {
