@@ -52,53 +52,41 @@ AlgorithmSpec Ant() {
   return SpecOf("ant", 28, {ActionKind::kContinuous, 8});
 }
 
-AlgorithmSpec Dbr(AlgorithmSpec spec) {
-  DbrConfig* dbr = spec.config.mutable_dbr();
-  if (!spec.actions.discrete()) dbr->set_divergence(DbrConfig::MMD_EXACT);
+// The algorithm that `set` chooses, on one thread.
+template <class Set>
+AlgorithmSpec With(AlgorithmSpec spec, const Set& set) {
+  set(spec.config);
   spec.config.set_threads(1);
   return spec;
 }
 
-AlgorithmSpec Sac(AlgorithmSpec spec) {
-  spec.config.mutable_sac();
-  spec.config.set_threads(1);
-  return spec;
+void Dbr(AlgorithmConfig& config) {
+  config.mutable_dbr()->set_divergence(DbrConfig::MMD_EXACT);
 }
-
-AlgorithmSpec Ddqn(AlgorithmSpec spec) {
-  spec.config.mutable_ddqn();
-  spec.config.set_threads(1);
-  return spec;
+// Over discrete actions by KL, the default.
+void DiscreteDbr(AlgorithmConfig& config) {
+  config.mutable_dbr();
 }
-
-AlgorithmSpec SacDiscrete(AlgorithmSpec spec) {
-  spec.config.mutable_sac_discrete();
-  spec.config.set_threads(1);
-  return spec;
+void Bear(AlgorithmConfig& config) {
+  config.mutable_bear()->set_warm_start_updates(0);
 }
-
-AlgorithmSpec Brac(AlgorithmSpec spec) {
-  spec.config.mutable_brac();
-  spec.config.set_threads(1);
-  return spec;
+void Brac(AlgorithmConfig& config) {
+  config.mutable_brac();
 }
-
-AlgorithmSpec Td3(AlgorithmSpec spec) {
-  spec.config.mutable_td3();
-  spec.config.set_threads(1);
-  return spec;
+void Sac(AlgorithmConfig& config) {
+  config.mutable_sac();
 }
-
-AlgorithmSpec Awac(AlgorithmSpec spec) {
-  spec.config.mutable_awac();
-  spec.config.set_threads(1);
-  return spec;
+void Td3(AlgorithmConfig& config) {
+  config.mutable_td3();
 }
-
-AlgorithmSpec Bear(AlgorithmSpec spec) {
-  spec.config.mutable_bear()->set_warm_start_updates(0);
-  spec.config.set_threads(1);
-  return spec;
+void Awac(AlgorithmConfig& config) {
+  config.mutable_awac();
+}
+void SacDiscrete(AlgorithmConfig& config) {
+  config.mutable_sac_discrete();
+}
+void Ddqn(AlgorithmConfig& config) {
+  config.mutable_ddqn();
 }
 
 AlgorithmSpec OnTwoThreads(AlgorithmSpec spec) {
@@ -127,23 +115,23 @@ void LearnerUpdate(benchmark::State& state, const AlgorithmSpec& spec) {
 #define DBR_UPDATE(name, spec) \
   BENCHMARK_CAPTURE(LearnerUpdate, , spec)->Name("LearnerUpdate/" name)->Unit(benchmark::kMillisecond)
 
-DBR_UPDATE("dbr/connect4", Dbr(Connect4()));
-DBR_UPDATE("ddqn/connect4", Ddqn(Connect4()));
-DBR_UPDATE("sac_discrete/connect4", SacDiscrete(Connect4()));
-DBR_UPDATE("sac/hopper", Sac(Hopper()));
-DBR_UPDATE("sac/ant", Sac(Ant()));
-DBR_UPDATE("dbr/hopper", Dbr(Hopper()));
-DBR_UPDATE("dbr/ant", Dbr(Ant()));
-DBR_UPDATE("bear/connect4", Bear(Connect4()));
-DBR_UPDATE("bear/ant", Bear(Ant()));
-DBR_UPDATE("brac/ant", Brac(Ant()));
-DBR_UPDATE("td3/ant", Td3(Ant()));
-DBR_UPDATE("awac/ant", Awac(Ant()));
+DBR_UPDATE("dbr/connect4", With(Connect4(), DiscreteDbr));
+DBR_UPDATE("bear/connect4", With(Connect4(), Bear));
+DBR_UPDATE("sac_discrete/connect4", With(Connect4(), SacDiscrete));
+DBR_UPDATE("ddqn/connect4", With(Connect4(), Ddqn));
+DBR_UPDATE("sac/hopper", With(Hopper(), Sac));
+DBR_UPDATE("dbr/hopper", With(Hopper(), Dbr));
+DBR_UPDATE("dbr/ant", With(Ant(), Dbr));
+DBR_UPDATE("bear/ant", With(Ant(), Bear));
+DBR_UPDATE("brac/ant", With(Ant(), Brac));
+DBR_UPDATE("sac/ant", With(Ant(), Sac));
+DBR_UPDATE("td3/ant", With(Ant(), Td3));
+DBR_UPDATE("awac/ant", With(Ant(), Awac));
 // In wall-clock time; beside them the same on one thread.
-DBR_UPDATE("sac/ant/one_thread", Sac(Ant()))->UseRealTime();
-DBR_UPDATE("dbr/ant/one_thread", Dbr(Ant()))->UseRealTime();
-DBR_UPDATE("sac/ant/two_threads", OnTwoThreads(Sac(Ant())))->UseRealTime();
-DBR_UPDATE("dbr/ant/two_threads", OnTwoThreads(Dbr(Ant())))->UseRealTime();
+DBR_UPDATE("sac/ant/one_thread", With(Ant(), Sac))->UseRealTime();
+DBR_UPDATE("dbr/ant/one_thread", With(Ant(), Dbr))->UseRealTime();
+DBR_UPDATE("sac/ant/two_threads", OnTwoThreads(With(Ant(), Sac)))->UseRealTime();
+DBR_UPDATE("dbr/ant/two_threads", OnTwoThreads(With(Ant(), Dbr)))->UseRealTime();
 #undef DBR_UPDATE
 
 // The limit: a product of two square matrices in single precision.
