@@ -124,8 +124,8 @@ absl::StatusOr<AlgorithmFacts> FindAlgorithm(const std::string& name) {
     if (one.name == name) return one;
     known.push_back(one.name);
   }
-  return absl::InvalidArgumentError(absl::StrCat("NAME: expected one of ", absl::StrJoin(known, ", "),
-                                                 "; found '", name, "', ", Suggest(name, known)));
+  return absl::InvalidArgumentError(
+      absl::StrCat("NAME: expected an algorithm, found '", name, "'; ", Suggest(name, known)));
 }
 
 std::string AlgorithmTable(const std::vector<AlgorithmFacts>& algorithms) {

@@ -54,11 +54,11 @@ TEST(AlgorithmsTest, TheTextSaysWhatAFieldTakes) {
                           HasSubstr("DYNAMIC_MAX | DYNAMIC_MIN | FIXED | NONE; a variant\n")));
 }
 
-TEST(AlgorithmsTest, AnUnknownNameIsRefusedWithTheKnownOnes) {
-  const auto unknown = FindAlgorithm("dbrr");
-  EXPECT_EQ(unknown.status().code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_THAT(std::string(unknown.status().message()),
-              AllOf(HasSubstr("sac"), HasSubstr("found 'dbrr'"), HasSubstr("did you mean 'dbr'")));
+TEST(AlgorithmsTest, AnUnknownNameIsRefusedWithTheNearestOrAllKnownOnes) {
+  const absl::Status near = FindAlgorithm("dbrr").status(), far = FindAlgorithm("nonsense").status();
+  EXPECT_EQ(near.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(near.message()), AllOf(HasSubstr("found 'dbrr'"), HasSubstr("did you mean 'dbr'")));
+  EXPECT_THAT(std::string(far.message()), HasSubstr("known: dbr, bear, sac"));
 }
 
 TEST(AlgorithmsTest, JsonHasTheSame) {
