@@ -8,8 +8,9 @@ namespace dbr::report {
 namespace {
 
 constexpr char kStyle[] = R"(
-body { max-width: 1100px; margin: 2rem auto; padding: 0 1rem; font: 16px/1.5 sans-serif; color: #222; background: #fff; }
+body { max-width: 1500px; margin: 2rem auto; padding: 0 1rem; font: 16px/1.5 sans-serif; color: #222; background: #fff; }
 h1, h2, h3 { line-height: 1.2; margin: 2rem 0 0.6rem; }
+p, li { max-width: 75em; }
 .wide { overflow-x: auto; margin: 1rem 0; }
 table { border-collapse: collapse; font-size: 14px; font-variant-numeric: tabular-nums; }
 th, td { padding: 0.25rem 0.7rem; text-align: left; white-space: nowrap; }

@@ -108,10 +108,11 @@ std::string PanelScript(const BarPlot& plot, const BarPanel& panel) {
   std::vector<std::string> elements;
   published.Draw("p", -kBarWidth / 2, kPublishedColour, plot.published_label, &script, &elements);
   ours.Draw("o", pairs ? kBarWidth / 2 : 0.0, kColours[0], plot.our_label, &script, &elements);
-  absl::StrAppend(&script, "set title ", Quoted(panel.title), "\nset ylabel ", Quoted(panel.y_label),
-                  "\nset xtics (", absl::StrJoin(tics, ", "),
-                  ") rotate by 35 right\nset xrange [-0.6:", static_cast<double>(panel.bars.size()) - 0.4,
-                  "]\nplot ", absl::StrJoin(elements, ", "), "\n");
+  absl::StrAppend(
+      &script, "set title ", Quoted(panel.title), "\nset ylabel ", Quoted(panel.y_label), "\nset xtics (",
+      absl::StrJoin(tics, ", "),
+      ") rotate by 35 right scale 0\nset xrange [-0.6:", static_cast<double>(panel.bars.size()) - 0.4,
+      "]\nplot ", absl::StrJoin(elements, ", "), "\n");
   return script;
 }
 

@@ -51,6 +51,7 @@ void AppendRow(const Runs& runs, const Row& row, const std::vector<int>& contend
     const int best = BestOf(row, contenders);
     for (std::size_t i = 0; i < contenders.size(); ++i) ours[i + 2].bold = contenders[i] == best;
     table->rows.push_back(std::move(ours));
+    if (best < 0) return;  // no run is done
     label.clear();
   }
   table->rows.push_back(
