@@ -193,6 +193,15 @@ TEST(SettingsTest, ListsWhatIsNotAtItsDefaultAndTellsConfigsApart) {
   EXPECT_NE(SettingsOf(other).digest, settings.digest);
 }
 
+TEST(SettingsTest, WhereTheOfflineDataLiesChangesNothing) {
+  Config config;
+  config.mutable_replay()->mutable_seed()->set_path("/here/hopper-medium.hdf5");
+  const Settings here = SettingsOf(config);
+  EXPECT_EQ(here.differences, "replay.seed.path: \"hopper-medium.hdf5\"\n");
+  config.mutable_replay()->mutable_seed()->set_path("hopper-medium.hdf5");
+  EXPECT_EQ(SettingsOf(config).digest, here.digest);
+}
+
 TEST(SettingsTest, NamesAnAlgorithmThatIsAllAtItsDefaults) {
   Config config;
   config.mutable_algorithm()->mutable_ddqn();
