@@ -1,6 +1,7 @@
 #include "nn/mlp.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/check.h"
@@ -41,15 +42,52 @@ Operand<Scalar> Weight(const MlpShape& shape, const Scalar* parameters, int laye
   return {parameters + shape.weight_offset(layer), shape.out(layer), shape.in(layer), shape.out(layer)};
 }
 
-// The delta of a layer's input: W^T delta [out x n], zero where that input was clipped; columns first ...
-// first + n.
-template <class Scalar>
+// The delta of a layer's input: W^T delta [out x n], zero where that input was clipped, into the columns from
+// `first` on. Column j of delta belongs to sample sample_of(j).
+template <class Scalar, class SampleOf>
 void PropagateDelta(const MlpShape& shape, const Scalar* parameters, int layer, const Operand<Scalar>& delta,
-                    Eigen::Index first, MlpActivations<Scalar>* activations) {
+                    Eigen::Index first, const SampleOf& sample_of, MlpActivations<Scalar>* activations) {
   auto previous = Columns(&activations->deltas[layer - 1], first, delta.cols);
-  const auto input = Columns(&activations->outputs[layer - 1], first, delta.cols);
   Product(Transposed(Weight(shape, parameters, layer)), delta, previous.data(), previous.rows());
-  previous.array() = (input.array() > Scalar{0}).select(previous.array(), Scalar{0});
+  const MatrixX<Scalar>& input = activations->outputs[layer - 1];
+  for (Eigen::Index j = 0; j < delta.cols; ++j) {
+    auto column = previous.col(j).array();
+    column = (input.col(sample_of(j)).array() > Scalar{0}).select(column, Scalar{0});
+  }
+}
+
+// The samples of a block whose output has a gradient at all: where a loss takes the smaller of two networks'
+// values, that is half of them.
+struct ActiveSamples {
+  std::array<Eigen::Index, kBlockColumns> columns;  // in rising order, from the block's first
+  Eigen::Index count = 0;
+};
+
+// Those of columns first ... first + n of dy, and their columns side by side into `gathered`.
+template <class Scalar>
+ActiveSamples GatherActive(const ConstMatrixRef<Scalar>& dy, Eigen::Index first, Eigen::Index n,
+                           MatrixX<Scalar>* gathered) {
+  ActiveSamples active;
+  gathered->resize(dy.rows(), kBlockColumns);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    if ((dy.col(first + j).array() == Scalar{0}).all()) continue;
+    gathered->col(active.count) = dy.col(first + j);
+    active.columns[active.count++] = j;
+  }
+  return active;
+}
+
+// Moves the first active.count columns of dx to where they belong, in place; the others become zero.
+template <class Scalar>
+void Scatter(const ActiveSamples& active, Eigen::Map<MatrixX<Scalar>> dx) {
+  Eigen::Index left = active.count;
+  for (Eigen::Index j = dx.cols() - 1; j >= left; --j) {
+    if (left > 0 && active.columns[left - 1] == j) {
+      dx.col(j) = dx.col(--left);
+    } else {
+      dx.col(j).setZero();
+    }
+  }
 }
 
 template <class Scalar>
@@ -122,7 +160,8 @@ void MlpParameterGradient(const MlpShape& shape, const Scalar* parameters, const
       bias += Eigen::Map<const VectorX<Scalar>>(delta.values + j * delta.stride, delta.rows);
     }
     if (layer == 0) break;
-    PropagateDelta(shape, parameters, layer, delta, 0, activations);
+    PropagateDelta(
+        shape, parameters, layer, delta, 0, [](Eigen::Index j) { return j; }, activations);
     delta = ColumnsOf<Scalar>(activations->deltas[layer - 1], 0, n);
   }
 }
@@ -134,12 +173,18 @@ void MlpInputGradient(const MlpShape& shape, const Scalar* parameters, const Con
   dx->resize(shape.input_size(), dy.cols());
   for (Eigen::Index first = 0; first < dy.cols(); first += kBlockColumns) {
     const Eigen::Index n = std::min(kBlockColumns, dy.cols() - first);
-    Operand<Scalar> delta = ColumnsOf(dy, first, n);
-    for (int layer = shape.layer_count() - 1; layer > 0; --layer) {
-      PropagateDelta(shape, parameters, layer, delta, first, activations);
-      delta = ColumnsOf<Scalar>(activations->deltas[layer - 1], first, n);
+    const ActiveSamples active = GatherActive(dy, first, n, &activations->active_dy);
+    auto block = Columns(dx, first, n);
+    if (active.count > 0) {
+      const auto sample_of = [&](Eigen::Index j) { return first + active.columns[j]; };
+      Operand<Scalar> delta = ColumnsOf<Scalar>(activations->active_dy, 0, active.count);
+      for (int layer = shape.layer_count() - 1; layer > 0; --layer) {
+        PropagateDelta(shape, parameters, layer, delta, first, sample_of, activations);
+        delta = ColumnsOf<Scalar>(activations->deltas[layer - 1], first, active.count);
+      }
+      Product(Transposed(Weight(shape, parameters, 0)), delta, block.data(), block.rows());
     }
-    Product(Transposed(Weight(shape, parameters, 0)), delta, dx->data() + first * dx->rows(), dx->rows());
+    Scatter(active, block);
   }
 }
 

@@ -40,6 +40,7 @@ template <class Scalar>
 struct MlpActivations {
   std::vector<MatrixX<Scalar>> outputs;  // of each layer after its ReLU (the last one has none): [out x n]
   std::vector<MatrixX<Scalar>> deltas;   // of each layer's input but the first: [in x n]
+  MatrixX<Scalar> active_dy;             // of MlpInputGradient
 };
 
 template <class Scalar>
@@ -57,7 +58,8 @@ void MlpParameterGradient(const MlpShape& shape, const Scalar* parameters, const
                           const ConstMatrixRef<Scalar>& dy, MlpActivations<Scalar>* activations,
                           VectorX<Scalar>* gradient);
 
-// The gradient of sum(dy .* y) with respect to x, [input x n], without the parameters' gradient.
+// The gradient of sum(dy .* y) with respect to x, [input x n], without the parameters' gradient. A sample
+// whose column of dy is zero costs nothing.
 template <class Scalar>
 void MlpInputGradient(const MlpShape& shape, const Scalar* parameters, const ConstMatrixRef<Scalar>& dy,
                       MlpActivations<Scalar>* activations, MatrixX<Scalar>* dx);

@@ -91,8 +91,11 @@ class TwinCritic {
   double FitFlops(Eigen::Index n) const {
     return 2 * (shape().ForwardFlops(n) + shape().ParameterGradientFlops(n));
   }
-  double InputGradientFlops(Eigen::Index n) const { return 4 * shape().ForwardFlops(n); }   // with Evaluate
-  double FirstInputGradientFlops(Eigen::Index n) const { return shape().ForwardFlops(n); }  // without it
+  // Of Evaluate and InputGradient, where each sample's gradient goes through one of the two.
+  double InputGradientFlops(Eigen::Index n) const { return 3 * shape().ForwardFlops(n); }
+  double FirstInputGradientFlops(Eigen::Index n) const {
+    return shape().ForwardFlops(n);
+  }  // without Evaluate
 
  private:
   struct Critic {

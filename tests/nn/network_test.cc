@@ -86,6 +86,27 @@ TEST_P(MlpDepth, GradientsAgreeWithDifferences) {
   ExpectNear(dx_of_deltas, dx);
 }
 
+// Over several blocks of columns, one of them without a gradient at all.
+TEST_P(MlpDepth, SamplesWithoutAGradientHaveNoneForTheirInput) {
+  Rng rng(4);
+  const MlpShape shape(4, GetParam(), 3);
+  const Vector parameters = InitialParameters<double>(shape, rng);
+  const Matrix x = Uniform(4, 900, rng);
+  Matrix dy = Uniform(3, 900, rng);
+  MlpActivations<double> activations;
+  MlpForward<double>(shape, parameters.data(), x, &activations);
+  Matrix expected, dx;
+  MlpInputGradient<double>(shape, parameters.data(), dy, &activations, &expected);
+  for (Eigen::Index j = 0; j < 900; ++j) {
+    if (rng.Uniform() < 0.5 || (j >= 256 && j < 512)) {
+      dy.col(j).setZero();
+      expected.col(j).setZero();
+    }
+  }
+  MlpInputGradient<double>(shape, parameters.data(), dy, &activations, &dx);
+  ExpectNear(dx, expected);
+}
+
 INSTANTIATE_TEST_SUITE_P(Depths, MlpDepth,
                          testing::Values(std::vector<int>{}, std::vector<int>{6}, std::vector<int>{5, 7, 6}));
 
