@@ -20,11 +20,11 @@ absl::Status Awac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const Basic
   networks_.Begin();
   ComputeValue(uniform);
   const Scalar critic_loss = FitCritics(uniform);
-  networks_.SetAdvantages(regression_.behavior_value(), value_);
   advantage_ = regression_.behavior_value() - value_;
+  networks_.SetAdvantages(advantage_);
   AdvantageWeights<Scalar>(advantage_, {config().temperature(), config().max_weight()}, &weights_);
   pi_.Step(uniform, &weights_, &networks_.policy);
-  networks_.critics.UpdateTargets(networks_.spec.config.target_tau());
+  networks_.UpdateTargets();
   ++networks_.updates;
   const AdvantageFigures advantages = FiguresOf(networks_.advantages);
   return SetMetrics({critic_loss, pi_.loss(), weights_.mean(), weights_.maxCoeff(),

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "learner/algorithm.h"
-#include "learner/parts/actor_critic_networks.h"
+#include "learner/parts/actor_critic.h"
 #include "learner/parts/critic_regression.h"
 #include "learner/parts/gaussian_likelihood.h"
 #include "learner/parts/sampled_actions.h"
@@ -47,7 +47,7 @@ class Awac {
   void ComputeValue(const BasicBatch<Scalar>& batch);
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
 
-  ActorCriticNetworks<Scalar> networks_;
+  ActorCritic<Scalar> networks_;
 
   GaussianLikelihood<Scalar> pi_{kBehaviorLogStd};
   GaussianHead<Scalar> next_pi_;

@@ -17,20 +17,19 @@ Brac<Scalar>::Brac(const AlgorithmSpec& spec)
 template <class Scalar>
 absl::Status Brac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
                                   const BasicBatch<Scalar>&) {
-  const AlgorithmConfig& common = networks_.spec.config;
   behavior_.set_learning_rate(networks_.Begin());
   networks_.runner.Run(
       [&] { beta_.Fit(uniform, nullptr, &behavior_); },
       [&] { next_pi_.Split(networks_.policy.ForwardTarget(uniform.next_observations), kPolicyLogStd); });
   ComputeNextValue(uniform);
-  const Scalar critic_loss = regression_.Fit(uniform, common.reward_scale(), next_value_, &networks_.critics);
+  const Scalar critic_loss =
+      regression_.Fit(uniform, networks_.spec.config.reward_scale(), next_value_, &networks_.critics);
   const BehaviorKlLoss<Scalar> loss = ImprovePolicy(uniform);
-  networks_.SetAdvantages(regression_.behavior_value(), value_);
+  networks_.SetAdvantages(regression_.behavior_value() - value_);
   if (config().adaptive_multiplier()) {
     multiplier_.Step(loss.divergence - static_cast<Scalar>(config().epsilon()));
   }
-  networks_.critics.UpdateTargets(common.target_tau());
-  networks_.policy.UpdateTarget(common.target_tau());
+  networks_.UpdateTargets();
   ++networks_.updates;
   const AdvantageFigures advantages = FiguresOf(networks_.advantages);
   return SetMetrics(

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "learner/algorithm.h"
-#include "learner/parts/actor_critic_networks.h"
+#include "learner/parts/actor_critic.h"
 #include "learner/parts/behavior_kl_objective.h"
 #include "learner/parts/critic_regression.h"
 #include "learner/parts/gaussian_likelihood.h"
@@ -52,7 +52,7 @@ class Brac {
   void ComputeNextValue(const BasicBatch<Scalar>& batch);
   BehaviorKlLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
 
-  ActorCriticNetworks<Scalar> networks_;
+  ActorCritic<Scalar> networks_;
   TrainedNetwork<Scalar> behavior_;
   Multiplier<Scalar> multiplier_;
 

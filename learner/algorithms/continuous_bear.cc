@@ -17,82 +17,68 @@ CvaeShape VaeShape(const AlgorithmSpec& spec) {
 
 template <class Scalar>
 ContinuousBear<Scalar>::ContinuousBear(const AlgorithmSpec& spec)
-    : spec_(spec),
-      options_(PolicyLossOptions::Of(spec.config.bear())),
-      rng_(spec.seed),
-      networks_(spec, MlpShape(spec.observation_size, spec.hidden_sizes, 2 * spec.actions.size),
-                MlpShape(spec.observation_size + spec.actions.size, spec.hidden_sizes, 1), rng_),
-      vae_(VaeShape(spec), spec.config.learning_rate(), rng_),
+    : options_(PolicyLossOptions::Of(spec.config.bear())),
+      networks_(spec),
+      vae_(VaeShape(spec), spec.config.learning_rate(), networks_.rng),
       metrics_(networks_.Metrics()) {}
 
 template <class Scalar>
 absl::Status ContinuousBear<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
                                             const BasicBatch<Scalar>&) {
-  vae_.set_learning_rate(networks_.Begin(spec_.config));
+  vae_.set_learning_rate(networks_.Begin());
   const Scalar behavior_loss = FitBehavior(uniform);
   const Scalar critic_loss = FitCritics(uniform);
   const ConstrainedLoss<Scalar> policy_loss = ImprovePolicy(uniform);
-  ComputeAdvantages(uniform.size());
-  networks_.Finish(spec_.config, policy_loss);
-  return networks_.Report({critic_loss, behavior_loss}, policy_loss, regression_.target().mean(), advantages_,
-                          &metrics_);
+  networks_.SetAdvantages(regression_.behavior_value() - value_);
+  networks_.Finish(policy_loss);
+  return networks_.Report({critic_loss, behavior_loss}, policy_loss, regression_.target().mean(), &metrics_);
 }
 
 template <class Scalar>
 Scalar ContinuousBear<Scalar>::FitBehavior(const BasicBatch<Scalar>& batch) {
-  FillNormal(rng_, vae_.shape().latent_size, batch.size(), &vae_noise_);
+  FillNormal(networks_.rng, vae_.shape().latent_size, batch.size(), &vae_noise_);
   return vae_
-      .Fit({batch.observations, batch.actions, vae_noise_},
-           static_cast<Scalar>(spec_.config.bear().vae_kl_weight()))
+      .Fit({batch.observations, batch.actions, vae_noise_}, static_cast<Scalar>(config().vae_kl_weight()))
       .loss;
 }
 
 template <class Scalar>
 Scalar ContinuousBear<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
-  const BearConfig& config = spec_.config.bear();
-  FillNormal(rng_, spec_.actions.size, config.target_samples() * batch.size(), &next_noise_);
+  FillNormal(networks_.rng, networks_.spec.actions.size, config().target_samples() * batch.size(),
+             &next_noise_);
   const VectorX<Scalar>& next_value =
-      next_.Compute(batch.next_observations, next_noise_, static_cast<Scalar>(config.target_min_weight()),
+      next_.Compute(batch.next_observations, next_noise_, static_cast<Scalar>(config().target_min_weight()),
                     &networks_.policy, &networks_.critics);
-  return regression_.Fit(batch, spec_.config.reward_scale(), next_value, &networks_.critics);
+  return regression_.Fit(batch, networks_.spec.config.reward_scale(), next_value, &networks_.critics);
 }
 
 template <class Scalar>
 ConstrainedLoss<Scalar> ContinuousBear<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
-  const BearConfig& config = spec_.config.bear();
-  const Eigen::Index n = batch.size(), samples = config.divergence_samples();
-  FillNormal(rng_, spec_.actions.size, config.policy_samples() * n, &action_noise_);
-  FillNormal(rng_, spec_.actions.size, samples * n, &divergence_noise_);
-  FillNormal(rng_, vae_.shape().latent_size, samples * n, &latent_noise_);
+  const Eigen::Index n = batch.size(), samples = config().divergence_samples();
+  FillNormal(networks_.rng, networks_.spec.actions.size, config().policy_samples() * n, &action_noise_);
+  FillNormal(networks_.rng, networks_.spec.actions.size, samples * n, &divergence_noise_);
+  FillNormal(networks_.rng, vae_.shape().latent_size, samples * n, &latent_noise_);
   const MatrixX<Scalar>& behavior =
-      vae_.Sample(batch.observations, latent_noise_, static_cast<Scalar>(config.vae_latent_limit()));
+      vae_.Sample(batch.observations, latent_noise_, static_cast<Scalar>(config().vae_latent_limit()));
   pi_.Split(networks_.policy.Forward(batch.observations), kPolicyLogStd);
-  options_.use_q = networks_.UseQ(config);
+  options_.use_q = networks_.UseQ();
   const ConstrainedLoss<Scalar> loss =
       objective_.Compute(options_, {{pi_, batch.observations, action_noise_}, divergence_noise_, behavior},
                          networks_.multiplier.value(), &networks_.critics, &d_output_);
   networks_.policy.Step(batch.observations, d_output_);
+  value_.resize(n);
+  MeanOfSmaller<Scalar>(networks_.critics.value1(), networks_.critics.value2(), &value_);
   return loss;
 }
 
 template <class Scalar>
-void ContinuousBear<Scalar>::ComputeAdvantages(Eigen::Index n) {
-  value_.resize(n);
-  MeanOfSmaller<Scalar>(networks_.critics.value1(), networks_.critics.value2(), &value_);
-  advantages_.resize(static_cast<std::size_t>(n));
-  Eigen::Map<Eigen::VectorXf>(advantages_.data(), n) =
-      (regression_.behavior_value() - value_).template cast<float>();
-}
-
-template <class Scalar>
 double ContinuousBear<Scalar>::UpdateFlops() const {
-  const BearConfig& config = spec_.config.bear();
   const Eigen::Index n = needs().uniform;
   const TwinCritic<Scalar>& critics = networks_.critics;
   const MlpShape& policy = networks_.policy.shape();
-  return vae_.shape().GradientFlops(n) + vae_.shape().DecodeFlops(n * config.divergence_samples()) +
-         critics.TargetFlops(n * config.target_samples()) + critics.FitFlops(n) +
-         critics.InputGradientFlops(n * config.policy_samples()) + 2 * policy.ForwardFlops(n) +
+  return vae_.shape().GradientFlops(n) + vae_.shape().DecodeFlops(n * config().divergence_samples()) +
+         critics.TargetFlops(n * config().target_samples()) + critics.FitFlops(n) +
+         critics.InputGradientFlops(n * config().policy_samples()) + 2 * policy.ForwardFlops(n) +
          policy.ParameterGradientFlops(n);
 }
 
@@ -100,14 +86,12 @@ template <class Scalar>
 void ContinuousBear<Scalar>::Save(TensorFile* file) const {
   networks_.Save(file);
   vae_.Save(file);
-  PutRng("bear.rng", rng_, file);
 }
 
 template <class Scalar>
 absl::Status ContinuousBear<Scalar>::Load(const TensorFile& file) {
   absl::Status status = networks_.Load(file);
   status.Update(vae_.Load(file));
-  status.Update(GetRng("bear.rng", file, &rng_));
   return status;
 }
 

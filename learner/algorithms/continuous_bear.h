@@ -5,7 +5,6 @@
 #include <memory>
 #include <vector>
 
-#include "core/rng.h"
 #include "learner/algorithm.h"
 #include "learner/parts/bear_networks.h"
 #include "learner/parts/bear_objective.h"
@@ -40,23 +39,21 @@ class ContinuousBear {
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return {.uniform = static_cast<int>(spec_.config.batch_size())}; }
-  const std::vector<float>& advantages() const { return advantages_; }
+  BatchNeeds needs() const { return networks_.needs(); }
+  const std::vector<float>& advantages() const { return networks_.advantages; }
   const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const;
-  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(spec_, snapshot); }
+  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
   void Save(TensorFile* file) const;
   absl::Status Load(const TensorFile& file);
 
  private:
+  const BearConfig& config() const { return networks_.spec.config.bear(); }
   Scalar FitBehavior(const BasicBatch<Scalar>& batch);
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
   ConstrainedLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
-  void ComputeAdvantages(Eigen::Index n);
 
-  AlgorithmSpec spec_;
   PolicyLossOptions options_;
-  Rng rng_;
   BearNetworks<Scalar> networks_;
   BehaviorVae<Scalar> vae_;
 
@@ -66,7 +63,6 @@ class ContinuousBear {
   BearObjective<Scalar> objective_;
   MatrixX<Scalar> vae_noise_, next_noise_, action_noise_, divergence_noise_, latent_noise_, d_output_;
   VectorX<Scalar> value_;
-  std::vector<float> advantages_;
   std::vector<UpdateMetric> metrics_;
 };
 

@@ -7,49 +7,41 @@ namespace dbr {
 
 template <class Scalar>
 ContinuousDbr<Scalar>::ContinuousDbr(const AlgorithmSpec& spec)
-    : spec_(spec),
-      needs_(DualBehaviorNeeds(spec.config)),
-      options_(PolicyLossOptions::Of(spec.config.dbr())),
-      rng_(spec.seed),
-      policy_shape_(spec.observation_size, spec.hidden_sizes, 2 * spec.actions.size),
-      critic_shape_(spec.observation_size + spec.actions.size, spec.hidden_sizes, 1),
-      networks_(spec, policy_shape_, critic_shape_, rng_),
-      metrics_(networks_.Metrics()) {}
+    : options_(PolicyLossOptions::Of(spec.config.dbr())), networks_(spec), metrics_(networks_.Metrics()) {}
 
 template <class Scalar>
 absl::Status ContinuousDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                                            const BasicBatch<Scalar>& minus) {
-  networks_.Begin(spec_.config);
+  networks_.Begin();
   FitBehaviors(plus, minus);
   ComputeNextValue(uniform);
   EvaluateBehaviors(uniform);
-  const Scalar critic_loss = regression_.Fit(uniform, spec_.config.reward_scale(), next_value_,
+  const Scalar critic_loss = regression_.Fit(uniform, networks_.spec.config.reward_scale(), next_value_,
                                              &networks_.critics, RewardBonus(uniform));
   const PolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
   JudgeAndImitate(uniform);
-  networks_.Finish(spec_.config, policy_loss);
+  networks_.Finish(policy_loss);
   return networks_.Report({critic_loss, beta_plus_.loss(), beta_minus_.loss()}, policy_loss,
-                          regression_.target().mean(), advantages_, &metrics_);
+                          regression_.target().mean(), &metrics_);
 }
 
 template <class Scalar>
 void ContinuousDbr<Scalar>::FitBehaviors(const BasicBatch<Scalar>& plus, const BasicBatch<Scalar>& minus) {
   networks_.runner.Run(
       [&] {
-        if (!ImitatesItself(spec_.config.dbr())) beta_plus_.Fit(plus, nullptr, &networks_.beta_plus);
+        if (!ImitatesItself(config())) beta_plus_.Fit(plus, nullptr, &networks_.beta_plus);
       },
       [&] { beta_minus_.Fit(minus, nullptr, &networks_.beta_minus); });
 }
 
 template <class Scalar>
 void ContinuousDbr<Scalar>::ComputeNextValue(const BasicBatch<Scalar>& batch) {
-  const DbrConfig& config = spec_.config.dbr();
   const Eigen::Index n = batch.size();
-  FillNormal(rng_, spec_.actions.size, config.target_samples() * n, &next_noise_);
+  FillNormal(networks_.rng, networks_.spec.actions.size, config().target_samples() * n, &next_noise_);
   next_value_ =
-      next_.Compute(batch.next_observations, next_noise_, static_cast<Scalar>(config.target_min_weight()),
+      next_.Compute(batch.next_observations, next_noise_, static_cast<Scalar>(config().target_min_weight()),
                     &networks_.policy, &networks_.critics);
-  if (config.value_penalty() && networks_.constrained) {
+  if (config().value_penalty() && networks_.constrained) {
     DrawDivergenceNoise(n);
     penalty_.Compute({options_.divergence, options_.mmd_sigma}, next_.pi(),
                      beta_plus_.At(batch.next_observations, &networks_.beta_plus), {noise_.pi, noise_.plus});
@@ -65,7 +57,7 @@ void ContinuousDbr<Scalar>::EvaluateBehaviors(const BasicBatch<Scalar>& batch) {
 
 template <class Scalar>
 const VectorX<Scalar>* ContinuousDbr<Scalar>::RewardBonus(const BasicBatch<Scalar>& batch) {
-  const double weight = spec_.config.dbr().munchausen_weight();
+  const double weight = config().munchausen_weight();
   if (weight == 0) return nullptr;
   TanhLogProb<Scalar>(beta_plus_.head().view(), batch.actions, &log_prob_, nullptr);
   MunchausenBonus<Scalar>(weight, log_prob_, &bonus_);
@@ -75,20 +67,19 @@ const VectorX<Scalar>* ContinuousDbr<Scalar>::RewardBonus(const BasicBatch<Scala
 template <class Scalar>
 void ContinuousDbr<Scalar>::DrawDivergenceNoise(Eigen::Index n) {
   if (!IsSampled(options_.divergence)) return;
-  const Eigen::Index columns = n * spec_.config.dbr().divergence_samples();
+  const Eigen::Index columns = n * config().divergence_samples();
   for (MatrixX<Scalar>* noise : {&noise_.pi, &noise_.plus, &noise_.minus}) {
-    FillNormal(rng_, spec_.actions.size, columns, noise);
+    FillNormal(networks_.rng, networks_.spec.actions.size, columns, noise);
   }
 }
 
 template <class Scalar>
 PolicyLoss<Scalar> ContinuousDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
-  const DbrConfig& config = spec_.config.dbr();
   const Eigen::Index n = batch.size();
   pi_.Split(networks_.policy.Forward(batch.observations), kPolicyLogStd);
-  FillNormal(rng_, spec_.actions.size, config.policy_samples() * n, &noise_.actions);
+  FillNormal(networks_.rng, networks_.spec.actions.size, config().policy_samples() * n, &noise_.actions);
   DrawDivergenceNoise(n);
-  options_.use_q = networks_.updates >= config.warm_start_updates();
+  options_.use_q = networks_.updates >= config().warm_start_updates();
   const PolicyLoss<Scalar> loss =
       objective_.Compute(options_, {pi_, beta_plus_.head(), beta_minus_.head()}, batch.observations, noise_,
                          networks_.alpha(), &networks_.critics, &d_output_);
@@ -100,45 +91,21 @@ PolicyLoss<Scalar> ContinuousDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>
 
 template <class Scalar>
 void ContinuousDbr<Scalar>::JudgeAndImitate(const BasicBatch<Scalar>& batch) {
-  const Eigen::Index n = batch.size();
-  advantage_.resize(n);
-  if (ImitatesItself(spec_.config.dbr())) {
-    imitation_.Judge(batch, spec_.config.reward_scale(), value_);
-    advantage_ = imitation_.advantage();
+  if (ImitatesItself(config())) {
+    imitation_.Judge(batch, networks_.spec.config.reward_scale(), value_);
+    networks_.SetAdvantages(imitation_.advantage());
     if (imitation_.imitates()) beta_plus_.Fit(batch, &imitation_.weights(), &networks_.beta_plus);
   } else {
-    advantage_ = regression_.behavior_value() - value_;
+    networks_.SetAdvantages(regression_.behavior_value() - value_);
   }
-  advantages_.resize(static_cast<std::size_t>(n));
-  Eigen::Map<Eigen::VectorXf>(advantages_.data(), n) = advantage_.template cast<float>();
 }
 
 template <class Scalar>
 double ContinuousDbr<Scalar>::UpdateFlops() const {
-  const DbrConfig& config = spec_.config.dbr();
-  const Eigen::Index n = needs_.uniform;
+  const Eigen::Index n = needs().uniform;
   const TwinCritic<Scalar>& critics = networks_.critics;
-  return critics.TargetFlops(n * config.target_samples()) + critics.FitFlops(n) +
-         critics.InputGradientFlops(n * config.policy_samples()) +
-         networks_.PolicyFlops(needs_, config.value_penalty() && networks_.constrained ? 2 : 1);
-}
-
-template <class Scalar>
-void ContinuousDbr<Scalar>::ExportPolicy(PolicySnapshot* snapshot) const {
-  networks_.Export(spec_, snapshot);
-}
-
-template <class Scalar>
-void ContinuousDbr<Scalar>::Save(TensorFile* file) const {
-  networks_.Save(file);
-  PutRng("dbr.rng", rng_, file);
-}
-
-template <class Scalar>
-absl::Status ContinuousDbr<Scalar>::Load(const TensorFile& file) {
-  absl::Status status = networks_.Load(file);
-  status.Update(GetRng("dbr.rng", file, &rng_));
-  return status;
+  return critics.TargetFlops(n * config().target_samples()) + critics.FitFlops(n) +
+         critics.InputGradientFlops(n * config().policy_samples()) + networks_.PolicyFlops();
 }
 
 template class ContinuousDbr<float>;

@@ -4,7 +4,6 @@
 #include <memory>
 #include <vector>
 
-#include "core/rng.h"
 #include "learner/algorithm.h"
 #include "learner/parts/critic_regression.h"
 #include "learner/parts/dual_behavior_networks.h"
@@ -45,15 +44,16 @@ class ContinuousDbr {
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return needs_; }
-  const std::vector<float>& advantages() const { return advantages_; }
+  BatchNeeds needs() const { return networks_.needs(); }
+  const std::vector<float>& advantages() const { return networks_.advantages; }
   const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const;
-  void ExportPolicy(PolicySnapshot* snapshot) const;
-  void Save(TensorFile* file) const;
-  absl::Status Load(const TensorFile& file);
+  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
+  void Save(TensorFile* file) const { networks_.Save(file); }
+  absl::Status Load(const TensorFile& file) { return networks_.Load(file); }
 
  private:
+  const DbrConfig& config() const { return networks_.config(); }
   void FitBehaviors(const BasicBatch<Scalar>& plus, const BasicBatch<Scalar>& minus);
   // V'(s') [n] into next_value_.
   void ComputeNextValue(const BasicBatch<Scalar>& batch);
@@ -66,11 +66,7 @@ class ContinuousDbr {
   void JudgeAndImitate(const BasicBatch<Scalar>& batch);
   void DrawDivergenceNoise(Eigen::Index n);
 
-  AlgorithmSpec spec_;
-  BatchNeeds needs_;
   PolicyLossOptions options_;
-  Rng rng_;
-  MlpShape policy_shape_, critic_shape_;
   DualBehaviorNetworks<Scalar> networks_;
 
   GaussianLikelihood<Scalar> beta_plus_{kBehaviorLogStd}, beta_minus_{kBehaviorLogStd};
@@ -81,9 +77,8 @@ class ContinuousDbr {
   GaussianDivergence<Scalar> penalty_;
   ObjectiveNoise<Scalar> noise_;
   MatrixX<Scalar> next_noise_, d_output_;
-  VectorX<Scalar> next_value_, value_, advantage_, log_prob_, bonus_;
+  VectorX<Scalar> next_value_, value_, log_prob_, bonus_;
   SelfImitation<Scalar> imitation_;
-  std::vector<float> advantages_;
   std::vector<UpdateMetric> metrics_;
 };
 

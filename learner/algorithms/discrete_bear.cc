@@ -7,18 +7,15 @@ namespace dbr {
 
 template <class Scalar>
 DiscreteBear<Scalar>::DiscreteBear(const AlgorithmSpec& spec)
-    : spec_(spec),
-      options_(PolicyLossOptions::Of(spec.config.bear())),
-      init_rng_(spec.seed),
-      shape_(spec.observation_size, spec.hidden_sizes, spec.actions.size),
-      networks_(spec, shape_, shape_, init_rng_),
-      behavior_(shape_, spec.config.learning_rate(), /*with_target=*/false, init_rng_),
+    : options_(PolicyLossOptions::Of(spec.config.bear())),
+      networks_(spec),
+      behavior_(networks_.policy.shape(), spec.config.learning_rate(), /*with_target=*/false, networks_.rng),
       metrics_(networks_.Metrics()) {}
 
 template <class Scalar>
 absl::Status DiscreteBear<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
                                           const BasicBatch<Scalar>&) {
-  behavior_.set_learning_rate(networks_.Begin(spec_.config));
+  behavior_.set_learning_rate(networks_.Begin());
   networks_.runner.Run([&] { beta_.Fit(uniform, nullptr, &behavior_); },
                        [&] {
                          MaskedSoftmax<Scalar>(networks_.policy.ForwardTarget(uniform.next_observations),
@@ -30,17 +27,18 @@ absl::Status DiscreteBear<Scalar>::Update(const BasicBatch<Scalar>& uniform, con
   const ConstrainedLoss<Scalar> policy_loss = ImprovePolicy(uniform);
   ExpectedTargetValue<Scalar>(pi_, networks_.critics.q1(), networks_.critics.q2(), /*min_weight=*/1, &value_);
   ComputeAdvantages<Scalar>(networks_.critics.q1(), networks_.critics.q2(), uniform.actions, value_,
-                            &advantages_);
-  networks_.Finish(spec_.config, policy_loss);
-  return networks_.Report({critic_loss, beta_.loss()}, policy_loss, target_.mean(), advantages_, &metrics_);
+                            &networks_.advantages);
+  networks_.Finish(policy_loss);
+  return networks_.Report({critic_loss, beta_.loss()}, policy_loss, target_.mean(), &metrics_);
 }
 
 template <class Scalar>
 Scalar DiscreteBear<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
   networks_.critics.EvaluateTargets(batch.next_observations);
   ExpectedTargetValue<Scalar>(next_pi_, networks_.critics.target1(), networks_.critics.target2(),
-                              static_cast<Scalar>(spec_.config.bear().target_min_weight()), &target_);
-  CriticTarget(batch, spec_.config.reward_scale(), target_, &target_);
+                              static_cast<Scalar>(networks_.spec.config.bear().target_min_weight()),
+                              &target_);
+  CriticTarget(batch, networks_.spec.config.reward_scale(), target_, &target_);
   return networks_.critics.Fit(batch.observations, [&](const MatrixX<Scalar>& q, MatrixX<Scalar>* d_q) {
     return CriticLoss<Scalar>(q, batch.actions, target_, d_q);
   });
@@ -48,7 +46,7 @@ Scalar DiscreteBear<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
 
 template <class Scalar>
 ConstrainedLoss<Scalar> DiscreteBear<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
-  options_.use_q = networks_.UseQ(spec_.config.bear());
+  options_.use_q = networks_.UseQ();
   const ConstrainedLoss<Scalar> loss = ConstrainedPolicyLoss<Scalar>(
       options_, {pi_, networks_.critics.q1(), networks_.critics.q2()},
       {beta_.distribution(), static_cast<Scalar>(options_.epsilon), networks_.multiplier.value()},
@@ -61,13 +59,14 @@ template <class Scalar>
 double DiscreteBear<Scalar>::UpdateFlops() const {
   const Eigen::Index n = needs().uniform;
   // beta, pi' and pi, and the steps of beta and pi.
-  return 3 * shape_.ForwardFlops(n) + 2 * shape_.ParameterGradientFlops(n) +
-         networks_.critics.TargetFlops(n) + networks_.critics.FitFlops(n);
+  const MlpShape& shape = networks_.policy.shape();
+  return 3 * shape.ForwardFlops(n) + 2 * shape.ParameterGradientFlops(n) + networks_.critics.TargetFlops(n) +
+         networks_.critics.FitFlops(n);
 }
 
 template <class Scalar>
 void DiscreteBear<Scalar>::ExportPolicy(PolicySnapshot* snapshot) const {
-  networks_.Export(spec_, snapshot);
+  networks_.Export(snapshot);
   ExportNetwork(kBehavior, behavior_.parameters(), snapshot);
 }
 

@@ -5,7 +5,6 @@
 #include <memory>
 #include <vector>
 
-#include "core/rng.h"
 #include "learner/algorithm.h"
 #include "learner/parts/bear_networks.h"
 #include "learner/parts/categorical_likelihood.h"
@@ -36,8 +35,8 @@ class DiscreteBear {
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return {.uniform = static_cast<int>(spec_.config.batch_size())}; }
-  const std::vector<float>& advantages() const { return advantages_; }
+  BatchNeeds needs() const { return networks_.needs(); }
+  const std::vector<float>& advantages() const { return networks_.advantages; }
   const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const;
   void ExportPolicy(PolicySnapshot* snapshot) const;
@@ -48,10 +47,7 @@ class DiscreteBear {
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
   ConstrainedLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
 
-  AlgorithmSpec spec_;
   PolicyLossOptions options_;
-  Rng init_rng_;
-  MlpShape shape_;
   BearNetworks<Scalar> networks_;
   TrainedNetwork<Scalar> behavior_;
 
@@ -60,7 +56,6 @@ class DiscreteBear {
   PolicyLossWorkspace<Scalar> workspace_;
   VectorX<Scalar> target_, value_;
   MatrixX<Scalar> d_logits_;
-  std::vector<float> advantages_;
   std::vector<UpdateMetric> metrics_;
 };
 

@@ -47,15 +47,16 @@ class DiscreteDbr {
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return needs_; }
-  const std::vector<float>& advantages() const { return advantages_; }
+  BatchNeeds needs() const { return networks_.needs(); }
+  const std::vector<float>& advantages() const { return networks_.advantages; }
   const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const;
-  void ExportPolicy(PolicySnapshot* snapshot) const;
-  void Save(TensorFile* file) const;
-  absl::Status Load(const TensorFile& file);
+  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
+  void Save(TensorFile* file) const { networks_.Save(file); }
+  absl::Status Load(const TensorFile& file) { return networks_.Load(file); }
 
  private:
+  const DbrConfig& config() const { return networks_.config(); }
   void FitBehaviors(const BasicBatch<Scalar>& plus, const BasicBatch<Scalar>& minus);
   void ComputeTargets(const BasicBatch<Scalar>& batch);
   // beta+ and beta- at the batch's states.
@@ -66,11 +67,7 @@ class DiscreteDbr {
   // After ImprovePolicy: the advantages, and self-imitation's fit.
   void JudgeAndImitate(const BasicBatch<Scalar>& batch);
 
-  AlgorithmSpec spec_;
-  BatchNeeds needs_;
   PolicyLossOptions options_;
-  Rng init_rng_;
-  MlpShape shape_;
   DualBehaviorNetworks<Scalar> networks_;
 
   CategoricalLikelihood<Scalar> beta_plus_, beta_minus_;
@@ -79,7 +76,6 @@ class DiscreteDbr {
   VectorX<Scalar> target_, penalty_, log_prob_, bonus_, value_;
   SelfImitation<Scalar> imitation_;
   MatrixX<Scalar> d_logits_;
-  std::vector<float> advantages_;
   std::vector<UpdateMetric> metrics_;
 };
 

@@ -5,7 +5,6 @@
 #include <memory>
 #include <vector>
 
-#include "core/rng.h"
 #include "learner/algorithm.h"
 #include "learner/parts/continuous_losses.h"
 #include "learner/parts/critic_regression.h"
@@ -33,21 +32,18 @@ class Sac {
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return {.uniform = static_cast<int>(spec_.config.batch_size())}; }
-  const std::vector<float>& advantages() const { return advantages_; }
+  BatchNeeds needs() const { return networks_.needs(); }
+  const std::vector<float>& advantages() const { return networks_.advantages; }
   const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const;
-  void ExportPolicy(PolicySnapshot* snapshot) const;
-  void Save(TensorFile* file) const;
-  absl::Status Load(const TensorFile& file);
+  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
+  void Save(TensorFile* file) const { networks_.Save(file); }
+  absl::Status Load(const TensorFile& file) { return networks_.Load(file); }
 
  private:
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
   SoftPolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
 
-  AlgorithmSpec spec_;
-  Rng rng_;
-  MlpShape policy_shape_, critic_shape_;
   SoftNetworks<Scalar> networks_;
   Scalar target_entropy_;  // nats
 
@@ -57,7 +53,6 @@ class Sac {
   CriticRegression<Scalar> regression_;
   MatrixX<Scalar> noise_, d_output_;
   VectorX<Scalar> next_value_, value_;
-  std::vector<float> advantages_;
   std::vector<UpdateMetric> metrics_;
 };
 

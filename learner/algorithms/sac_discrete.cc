@@ -13,25 +13,21 @@ constexpr int kSmaller = 1;  // the weight of the smaller twin in a value: all
 
 template <class Scalar>
 SacDiscrete<Scalar>::SacDiscrete(const AlgorithmSpec& spec)
-    : spec_(spec),
-      init_rng_(spec.seed),
-      shape_(spec.observation_size, spec.hidden_sizes, spec.actions.size),
-      networks_(spec, spec.config.sac_discrete(), shape_, shape_, init_rng_),
-      metrics_(networks_.Metrics()) {}
+    : networks_(spec, spec.config.sac_discrete()), metrics_(networks_.Metrics()) {}
 
 template <class Scalar>
 absl::Status SacDiscrete<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
                                          const BasicBatch<Scalar>&) {
-  networks_.Begin(spec_.config);
+  networks_.Begin();
   ComputeTarget(uniform);
   const Scalar critic_loss =
       networks_.critics.Fit(uniform.observations, [&](const MatrixX<Scalar>& q, MatrixX<Scalar>* d_q) {
         return CriticLoss<Scalar>(q, uniform.actions, target_, d_q);
       });
   const SoftPolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
-  const auto ratio = static_cast<Scalar>(spec_.config.sac_discrete().target_entropy_ratio());
-  networks_.Finish(spec_.config, policy_loss, ratio * MeanGreatestEntropy<Scalar>(uniform.masks));
-  return networks_.Report(critic_loss, policy_loss, target_.mean(), advantages_, &metrics_);
+  const auto ratio = static_cast<Scalar>(networks_.spec.config.sac_discrete().target_entropy_ratio());
+  networks_.Finish(policy_loss, ratio * MeanGreatestEntropy<Scalar>(uniform.masks));
+  return networks_.Report(critic_loss, policy_loss, target_.mean(), &metrics_);
 }
 
 template <class Scalar>
@@ -42,7 +38,7 @@ void SacDiscrete<Scalar>::ComputeTarget(const BasicBatch<Scalar>& batch) {
                               &next_value_);
   Entropy(next_pi_, &entropy_);
   next_value_ += networks_.temperature.value() * entropy_;
-  CriticTarget(batch, spec_.config.reward_scale(), next_value_, &target_);
+  CriticTarget(batch, networks_.spec.config.reward_scale(), next_value_, &target_);
 }
 
 // And what every transition's advantage is.
@@ -54,7 +50,7 @@ SoftPolicyLoss<Scalar> SacDiscrete<Scalar>::ImprovePolicy(const BasicBatch<Scala
       DiscreteSoftPolicyLoss<Scalar>(pi_, q1, q2, networks_.temperature.value(), &entropy_, &d_logits_);
   networks_.policy.Step(batch.observations, d_logits_);
   ExpectedTargetValue<Scalar>(pi_, q1, q2, kSmaller, &value_);
-  ComputeAdvantages<Scalar>(q1, q2, batch.actions, value_, &advantages_);
+  ComputeAdvantages<Scalar>(q1, q2, batch.actions, value_, &networks_.advantages);
   return loss;
 }
 

@@ -5,7 +5,6 @@
 #include <memory>
 #include <vector>
 
-#include "core/rng.h"
 #include "learner/algorithm.h"
 #include "learner/parts/soft_networks.h"
 #include "nn/categorical.h"
@@ -34,11 +33,11 @@ class SacDiscrete {
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return {.uniform = static_cast<int>(spec_.config.batch_size())}; }
-  const std::vector<float>& advantages() const { return advantages_; }
+  BatchNeeds needs() const { return networks_.needs(); }
+  const std::vector<float>& advantages() const { return networks_.advantages; }
   const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const { return networks_.UpdateFlops(needs().uniform); }
-  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(spec_, snapshot); }
+  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
   void Save(TensorFile* file) const { networks_.Save(file); }
   absl::Status Load(const TensorFile& file) { return networks_.Load(file); }
 
@@ -46,15 +45,11 @@ class SacDiscrete {
   void ComputeTarget(const BasicBatch<Scalar>& batch);
   SoftPolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
 
-  AlgorithmSpec spec_;
-  Rng init_rng_;
-  MlpShape shape_;
   SoftNetworks<Scalar> networks_;
 
   Categorical<Scalar> pi_, next_pi_;
   VectorX<Scalar> next_value_, target_, value_, entropy_;  // [n]
   MatrixX<Scalar> d_logits_;                               // [actions x n]
-  std::vector<float> advantages_;
   std::vector<UpdateMetric> metrics_;
 };
 

@@ -54,12 +54,11 @@ Scalar Td3<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
   const Scalar loss = objective_.Evaluate(pi_, batch.observations, &critics);
   value_.resize(batch.size());
   MeanOfSmaller<Scalar>(critics.value1(), critics.value2(), &value_);
-  networks_.SetAdvantages(regression_.behavior_value(), value_);
+  networks_.SetAdvantages(regression_.behavior_value() - value_);
   if (networks_.updates % config().policy_delay() != 0) return loss;
   objective_.Gradient(pi_, &critics, &d_output_);
   networks_.policy.Step(batch.observations, d_output_);
-  critics.UpdateTargets(networks_.spec.config.target_tau());
-  networks_.policy.UpdateTarget(networks_.spec.config.target_tau());
+  networks_.UpdateTargets();
   return loss;
 }
 

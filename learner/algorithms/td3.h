@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "learner/algorithm.h"
-#include "learner/parts/actor_critic_networks.h"
+#include "learner/parts/actor_critic.h"
 #include "learner/parts/critic_regression.h"
 #include "learner/parts/deterministic_policy.h"
 #include "nn/gaussian_head.h"
@@ -46,7 +46,7 @@ class Td3 {
   // Steps 2 and 3; the policy's loss, also where it does not move.
   Scalar ImprovePolicy(const BasicBatch<Scalar>& batch);
 
-  ActorCriticNetworks<Scalar> networks_;
+  ActorCritic<Scalar> networks_;
 
   GaussianHead<Scalar> pi_, next_pi_;
   DeterministicPolicyObjective<Scalar> objective_;

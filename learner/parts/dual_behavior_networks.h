@@ -1,21 +1,14 @@
-// What DBR trains, whatever the actions: networks, multiplier and counter, and the parts of an update that do
-// not depend on the kind of action.
+// What DBR trains, whatever the actions: an actor-critic, the behaviour policies of D+ and D- and the
+// multiplier, and the parts of an update that do not depend on the kind of action.
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
-#include "learner/algorithm.h"
-#include "learner/parts/actor_critic_state.h"
+#include "learner/parts/actor_critic.h"
 #include "learner/parts/dual_behavior.h"
-#include "learner/parts/learning_rate.h"
 #include "learner/parts/multiplier.h"
-#include "learner/parts/pair_runner.h"
-#include "learner/parts/policy_export.h"
-#include "learner/parts/trained_network.h"
-#include "learner/parts/twin_critic.h"
 #include "learner/parts/update_metrics.h"
 
 namespace dbr {
@@ -28,50 +21,48 @@ struct FitLosses {
   Scalar beta_minus = 0;  // mean of -log beta-(a|s)
 };
 
-// One thread at a time, but for what runs on `runner`.
 template <class Scalar>
-struct DualBehaviorNetworks {
-  DualBehaviorNetworks(const AlgorithmSpec& spec, const MlpShape& policy_shape, const MlpShape& critic_shape,
-                       Rng& rng)
-      : runner(UpdateThreads(spec.config)),
-        policy(policy_shape, spec.config.learning_rate(), /*with_target=*/true, rng),
-        critics(critic_shape, spec.config.learning_rate(), rng, &runner),
-        beta_plus(policy_shape, spec.config.learning_rate(), /*with_target=*/false, rng),
-        beta_minus(policy_shape, spec.config.learning_rate(), /*with_target=*/false, rng),
+struct DualBehaviorNetworks : ActorCritic<Scalar> {
+  explicit DualBehaviorNetworks(const AlgorithmSpec& spec)
+      : ActorCritic<Scalar>(spec, /*policy_target=*/true),
+        beta_plus(this->policy.shape(), spec.config.learning_rate(), /*with_target=*/false, this->rng),
+        beta_minus(this->policy.shape(), spec.config.learning_rate(), /*with_target=*/false, this->rng),
         multiplier(spec.config.dbr().first_multiplier(), spec.config.dbr().multiplier_learning_rate()),
         constrained(spec.config.dbr().constraint() != DbrConfig::NONE) {}
+
+  const DbrConfig& config() const { return this->spec.config.dbr(); }
+  BatchNeeds needs() const { return DualBehaviorNeeds(this->spec.config); }
 
   // The multiplier of the divergence; 0 where there is no constraint.
   Scalar alpha() const { return constrained ? multiplier.value() : Scalar{0}; }
 
   // Sets the learning rate of this update.
-  void Begin(const AlgorithmConfig& config) {
-    const double learning_rate = LearningRate(config, updates);
-    policy.set_learning_rate(learning_rate);
-    critics.set_learning_rate(learning_rate);
+  void Begin() {
+    const double learning_rate = ActorCritic<Scalar>::Begin();
     beta_plus.set_learning_rate(learning_rate);
     beta_minus.set_learning_rate(learning_rate);
   }
 
   // The multiplier's step, and the targets'.
-  void Finish(const AlgorithmConfig& config, const PolicyLoss<Scalar>& loss) {
+  void Finish(const PolicyLoss<Scalar>& loss) {
     if (constrained) multiplier.Step(loss.divergence_plus - loss.threshold);
-    critics.UpdateTargets(config.target_tau());
-    policy.UpdateTarget(config.target_tau());
-    ++updates;
+    this->UpdateTargets();
+    ++this->updates;
   }
 
-  // Useful operations of the policies: both fits, and with `next_policies` forward passes at s' the rest.
-  double PolicyFlops(const BatchNeeds& needs, int next_policies) const {
-    const MlpShape& shape = policy.shape();
+  // Useful operations of the policies: both fits, and all forward passes.
+  double PolicyFlops() const {
+    const MlpShape& shape = this->policy.shape();
+    const BatchNeeds batch = needs();
     double flops = 0;
-    for (const int behavior : {needs.plus, needs.minus}) {
+    for (const int behavior : {batch.plus, batch.minus}) {
       flops += shape.ForwardFlops(behavior) + shape.ParameterGradientFlops(behavior);
     }
     // Self-imitation fits beta+ to B, where it was evaluated already.
-    if (needs.plus == 0) flops += shape.ParameterGradientFlops(needs.uniform);
-    const int forward = 3 + next_policies;  // pi, beta+ and beta- at s
-    return flops + forward * shape.ForwardFlops(needs.uniform) + shape.ParameterGradientFlops(needs.uniform);
+    if (batch.plus == 0) flops += shape.ParameterGradientFlops(batch.uniform);
+    // pi, beta+ and beta- at s; at s' the target pi', and beta+ where the value is penalised.
+    const int forward = config().value_penalty() && constrained ? 5 : 4;
+    return flops + forward * shape.ForwardFlops(batch.uniform) + shape.ParameterGradientFlops(batch.uniform);
   }
 
   static std::vector<UpdateMetric> Metrics() {
@@ -84,45 +75,39 @@ struct DualBehaviorNetworks {
 
   // Sets `metrics`; Internal where one is not finite.
   absl::Status Report(const FitLosses<Scalar>& fits, const PolicyLoss<Scalar>& loss, Scalar target_mean,
-                      const std::vector<float>& advantages, std::vector<UpdateMetric>* metrics) const {
-    const AdvantageFigures figures = FiguresOf(advantages);
+                      std::vector<UpdateMetric>* metrics) const {
+    const AdvantageFigures figures = FiguresOf(this->advantages);
     return SetMetrics({fits.critic, loss.loss, fits.beta_plus, fits.beta_minus, loss.divergence_plus,
                        loss.divergence_minus, loss.threshold, alpha(), loss.entropy, loss.value, target_mean,
                        figures.mean, figures.positive, figures.deviation},
-                      updates, metrics);
+                      this->updates, metrics);
   }
 
-  void Export(const AlgorithmSpec& spec, PolicySnapshot* snapshot) const {
-    ExportActorCritic(spec, policy, critics, snapshot);
-    snapshot->support_epsilon = static_cast<float>(spec.config.dbr().epsilon());
+  void Export(PolicySnapshot* snapshot) const {
+    ActorCritic<Scalar>::Export(snapshot);
+    snapshot->support_epsilon = static_cast<float>(config().epsilon());
     ExportNetwork(kBetaPlus, beta_plus.parameters(), snapshot);
     ExportNetwork(kBetaMinus, beta_minus.parameters(), snapshot);
   }
 
   void Save(TensorFile* file) const {
-    SaveActorCritic(policy, critics, file);
+    ActorCritic<Scalar>::Save(file);
     beta_plus.Save(kBetaPlus, file);
     beta_minus.Save(kBetaMinus, file);
     multiplier.Save(file);
-    PutCounter("dbr.updates", updates, file);
   }
   absl::Status Load(const TensorFile& file) {
-    absl::Status status = LoadActorCritic(file, &policy, &critics);
+    absl::Status status = ActorCritic<Scalar>::Load(file);
     status.Update(beta_plus.Load(kBetaPlus, file));
     status.Update(beta_minus.Load(kBetaMinus, file));
     status.Update(multiplier.Load(file));
-    status.Update(GetCounter("dbr.updates", file, &updates));
     return status;
   }
 
-  PairRunner runner;
-  TrainedNetwork<Scalar> policy;
-  TwinCritic<Scalar> critics;
   TrainedNetwork<Scalar> beta_plus;
   TrainedNetwork<Scalar> beta_minus;
   Multiplier<Scalar> multiplier;
   const bool constrained;
-  std::uint64_t updates = 0;
 };
 
 }  // namespace dbr

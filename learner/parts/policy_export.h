@@ -7,13 +7,17 @@
 
 namespace dbr {
 
+inline PolicySpec PolicySpecOf(const AlgorithmSpec& spec) {
+  return {.env = spec.env,
+          .algorithm = AlgorithmName(spec.config),
+          .observation_size = spec.observation_size,
+          .actions = spec.actions,
+          .hidden_sizes = spec.hidden_sizes};
+}
+
 // The spec; no networks yet.
 inline void BeginExport(const AlgorithmSpec& spec, PolicySnapshot* snapshot) {
-  snapshot->spec = {.env = spec.env,
-                    .algorithm = AlgorithmName(spec.config),
-                    .observation_size = spec.observation_size,
-                    .actions = spec.actions,
-                    .hidden_sizes = spec.hidden_sizes};
+  snapshot->spec = PolicySpecOf(spec);
   snapshot->networks.clear();
 }
 

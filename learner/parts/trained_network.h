@@ -68,7 +68,10 @@ class TrainedNetwork {
   void ResetTarget() {
     if (target_.size() > 0) target_ = parameters_;
   }
-  void UpdateTarget(double tau) { PolyakUpdate(parameters_, static_cast<Scalar>(tau), &target_); }
+  // Polyak averaging of the target, where there is one.
+  void UpdateTarget(double tau) {
+    if (target_.size() > 0) PolyakUpdate(parameters_, static_cast<Scalar>(tau), &target_);
+  }
 
   void Save(const std::string& name, TensorFile* file) const {
     TrainedNetwork& self = const_cast<TrainedNetwork&>(*this);
