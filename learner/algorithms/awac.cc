@@ -8,11 +8,17 @@ namespace dbr {
 
 template <class Scalar>
 Awac<Scalar>::Awac(const AlgorithmSpec& spec)
-    : networks_(spec, /*policy_target=*/false),
-      metrics_{{"train/critic_loss"},  {"train/actor_loss"},     {"train/weight_mean"},
-               {"train/weight_max"},   {"train/policy_entropy"}, {"train/value_mean"},
-               {"train/target_mean"},  {"train/advantage_mean"}, {"train/advantage_positive"},
-               {"train/advantage_std"}} {}
+    : Base({{"train/critic_loss"},
+            {"train/actor_loss"},
+            {"train/weight_mean"},
+            {"train/weight_max"},
+            {"train/policy_entropy"},
+            {"train/value_mean"},
+            {"train/target_mean"},
+            {"train/advantage_mean"},
+            {"train/advantage_positive"},
+            {"train/advantage_std"}},
+           spec, /*policy_target=*/false) {}
 
 template <class Scalar>
 absl::Status Awac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
@@ -59,7 +65,7 @@ Scalar Awac<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
 
 template <class Scalar>
 double Awac<Scalar>::UpdateFlops() const {
-  const Eigen::Index n = needs().uniform;
+  const Eigen::Index n = this->needs().uniform;
   const TwinCritic<Scalar>& critics = networks_.critics;
   const MlpShape& policy = networks_.policy.shape();
   return critics.TargetFlops(n) + critics.TargetFlops(n * config().value_samples()) + critics.FitFlops(n) +

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "learner/algorithm.h"
+#include "learner/algorithms/actor_critic_algorithm.h"
 #include "learner/parts/actor_critic.h"
 #include "learner/parts/critic_regression.h"
 #include "learner/parts/gaussian_likelihood.h"
@@ -25,7 +25,7 @@ namespace dbr {
 // policies' own lower limit of -20 the likelihood of data from a deterministic policy has no useful bound.
 // Actors clip at -20: at the bound pi may sample more narrowly than e^-5, never more broadly.
 template <class Scalar>
-class Awac {
+class Awac : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
  public:
   explicit Awac(const AlgorithmSpec& spec);
 
@@ -33,21 +33,17 @@ class Awac {
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return networks_.needs(); }
-  const std::vector<float>& advantages() const { return networks_.advantages; }
-  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const;
-  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
-  void Save(TensorFile* file) const { networks_.Save(file); }
-  absl::Status Load(const TensorFile& file) { return networks_.Load(file); }
 
  private:
+  using Base = ActorCriticAlgorithm<ActorCritic<Scalar>>;
+  using Base::metrics_;
+  using Base::networks_;
+
   const AwacConfig& config() const { return networks_.spec.config.awac(); }
   // V(s) [n] into value_, by draws from pi at s.
   void ComputeValue(const BasicBatch<Scalar>& batch);
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
-
-  ActorCritic<Scalar> networks_;
 
   GaussianLikelihood<Scalar> pi_{kBehaviorLogStd};
   GaussianHead<Scalar> next_pi_;
@@ -55,7 +51,6 @@ class Awac {
   CriticRegression<Scalar> regression_;
   MatrixX<Scalar> noise_, next_noise_;
   VectorX<Scalar> value_, next_value_, advantage_, weights_;
-  std::vector<UpdateMetric> metrics_;
 };
 
 std::unique_ptr<Algorithm> MakeAwac(const AlgorithmSpec& spec);

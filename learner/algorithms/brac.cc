@@ -6,13 +6,20 @@
 namespace dbr {
 template <class Scalar>
 Brac<Scalar>::Brac(const AlgorithmSpec& spec)
-    : networks_(spec, /*policy_target=*/true),
+    : Base({{"train/critic_loss"},
+            {"train/actor_loss"},
+            {"train/behavior_loss"},
+            {"train/divergence"},
+            {"train/multiplier"},
+            {"train/policy_entropy"},
+            {"train/value_mean"},
+            {"train/target_mean"},
+            {"train/advantage_mean"},
+            {"train/advantage_positive"},
+            {"train/advantage_std"}},
+           spec, /*policy_target=*/true),
       behavior_(networks_.policy.shape(), spec.config.learning_rate(), /*with_target=*/false, networks_.rng),
-      multiplier_(spec.config.brac().first_multiplier(), spec.config.brac().multiplier_learning_rate()),
-      metrics_{{"train/critic_loss"},        {"train/actor_loss"},   {"train/behavior_loss"},
-               {"train/divergence"},         {"train/multiplier"},   {"train/policy_entropy"},
-               {"train/value_mean"},         {"train/target_mean"},  {"train/advantage_mean"},
-               {"train/advantage_positive"}, {"train/advantage_std"}} {}
+      multiplier_(spec.config.brac().first_multiplier(), spec.config.brac().multiplier_learning_rate()) {}
 
 template <class Scalar>
 absl::Status Brac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
@@ -70,7 +77,7 @@ BehaviorKlLoss<Scalar> Brac<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& bat
 
 template <class Scalar>
 double Brac<Scalar>::UpdateFlops() const {
-  const Eigen::Index n = needs().uniform;
+  const Eigen::Index n = this->needs().uniform;
   const TwinCritic<Scalar>& critics = networks_.critics;
   const MlpShape& policy = networks_.policy.shape();
   const int forward = config().variant() == BracConfig::VP ? 4 : 3;  // pi, beta at s, pi' (and beta) at s'

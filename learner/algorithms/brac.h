@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "learner/algorithm.h"
+#include "learner/algorithms/actor_critic_algorithm.h"
 #include "learner/parts/actor_critic.h"
 #include "learner/parts/behavior_kl_objective.h"
 #include "learner/parts/critic_regression.h"
@@ -30,7 +30,7 @@ namespace dbr {
 // Q term out at first, gives it time); step 3 takes beta from before step 1's gradient step, so that nothing
 // is computed twice; the target's draw is of pi', not of pi.
 template <class Scalar>
-class Brac {
+class Brac : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
  public:
   explicit Brac(const AlgorithmSpec& spec);
 
@@ -38,21 +38,20 @@ class Brac {
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return networks_.needs(); }
-  const std::vector<float>& advantages() const { return networks_.advantages; }
-  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const;
-  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
   void Save(TensorFile* file) const;
   absl::Status Load(const TensorFile& file);
 
  private:
+  using Base = ActorCriticAlgorithm<ActorCritic<Scalar>>;
+  using Base::metrics_;
+  using Base::networks_;
+
   const BracConfig& config() const { return networks_.spec.config.brac(); }
   // V'(s') [n] into next_value_.
   void ComputeNextValue(const BasicBatch<Scalar>& batch);
   BehaviorKlLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
 
-  ActorCritic<Scalar> networks_;
   TrainedNetwork<Scalar> behavior_;
   Multiplier<Scalar> multiplier_;
 
@@ -63,7 +62,6 @@ class Brac {
   BehaviorKlObjective<Scalar> objective_;
   MatrixX<Scalar> noise_, next_noise_, d_output_;
   VectorX<Scalar> next_value_, next_kl_, value_;
-  std::vector<UpdateMetric> metrics_;
 };
 
 std::unique_ptr<Algorithm> MakeBrac(const AlgorithmSpec& spec);

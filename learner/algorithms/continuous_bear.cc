@@ -17,10 +17,9 @@ CvaeShape VaeShape(const AlgorithmSpec& spec) {
 
 template <class Scalar>
 ContinuousBear<Scalar>::ContinuousBear(const AlgorithmSpec& spec)
-    : options_(PolicyLossOptions::Of(spec.config.bear())),
-      networks_(spec),
-      vae_(VaeShape(spec), spec.config.learning_rate(), networks_.rng),
-      metrics_(networks_.Metrics()) {}
+    : Base(BearNetworks<Scalar>::Metrics(), spec),
+      options_(PolicyLossOptions::Of(spec.config.bear())),
+      vae_(VaeShape(spec), spec.config.learning_rate(), networks_.rng) {}
 
 template <class Scalar>
 absl::Status ContinuousBear<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
@@ -73,7 +72,7 @@ ConstrainedLoss<Scalar> ContinuousBear<Scalar>::ImprovePolicy(const BasicBatch<S
 
 template <class Scalar>
 double ContinuousBear<Scalar>::UpdateFlops() const {
-  const Eigen::Index n = needs().uniform;
+  const Eigen::Index n = this->needs().uniform;
   const TwinCritic<Scalar>& critics = networks_.critics;
   const MlpShape& policy = networks_.policy.shape();
   return vae_.shape().GradientFlops(n) + vae_.shape().DecodeFlops(n * config().divergence_samples()) +

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "learner/algorithm.h"
+#include "learner/algorithms/actor_critic_algorithm.h"
 #include "learner/parts/bear_networks.h"
 #include "learner/parts/bear_objective.h"
 #include "learner/parts/behavior_vae.h"
@@ -31,7 +31,7 @@ namespace dbr {
 // ensemble; the Q term draws from pi anew, where the code takes one of the MMD's draws; the limits of pi's
 // log-std are the house's; step 6.
 template <class Scalar>
-class ContinuousBear {
+class ContinuousBear : public ActorCriticAlgorithm<BearNetworks<Scalar>> {
  public:
   explicit ContinuousBear(const AlgorithmSpec& spec);
 
@@ -39,22 +39,21 @@ class ContinuousBear {
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return networks_.needs(); }
-  const std::vector<float>& advantages() const { return networks_.advantages; }
-  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const;
-  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
   void Save(TensorFile* file) const;
   absl::Status Load(const TensorFile& file);
 
  private:
+  using Base = ActorCriticAlgorithm<BearNetworks<Scalar>>;
+  using Base::metrics_;
+  using Base::networks_;
+
   const BearConfig& config() const { return networks_.spec.config.bear(); }
   Scalar FitBehavior(const BasicBatch<Scalar>& batch);
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
   ConstrainedLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
 
   PolicyLossOptions options_;
-  BearNetworks<Scalar> networks_;
   BehaviorVae<Scalar> vae_;
 
   CriticRegression<Scalar> regression_;
@@ -63,7 +62,6 @@ class ContinuousBear {
   BearObjective<Scalar> objective_;
   MatrixX<Scalar> vae_noise_, next_noise_, action_noise_, divergence_noise_, latent_noise_, d_output_;
   VectorX<Scalar> value_;
-  std::vector<UpdateMetric> metrics_;
 };
 
 // InvalidArgument where the divergence is none that samples give: a VAE has no density.

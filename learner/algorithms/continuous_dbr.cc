@@ -7,7 +7,8 @@ namespace dbr {
 
 template <class Scalar>
 ContinuousDbr<Scalar>::ContinuousDbr(const AlgorithmSpec& spec)
-    : options_(PolicyLossOptions::Of(spec.config.dbr())), networks_(spec), metrics_(networks_.Metrics()) {}
+    : Base(DualBehaviorNetworks<Scalar>::Metrics(), spec),
+      options_(PolicyLossOptions::Of(spec.config.dbr())) {}
 
 template <class Scalar>
 absl::Status ContinuousDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
@@ -102,7 +103,7 @@ void ContinuousDbr<Scalar>::JudgeAndImitate(const BasicBatch<Scalar>& batch) {
 
 template <class Scalar>
 double ContinuousDbr<Scalar>::UpdateFlops() const {
-  const Eigen::Index n = needs().uniform;
+  const Eigen::Index n = this->needs().uniform;
   const TwinCritic<Scalar>& critics = networks_.critics;
   return critics.TargetFlops(n * config().target_samples()) + critics.FitFlops(n) +
          critics.InputGradientFlops(n * config().policy_samples()) + networks_.PolicyFlops();

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "learner/algorithm.h"
+#include "learner/algorithms/actor_critic_algorithm.h"
 #include "learner/parts/critic_regression.h"
 #include "learner/parts/dual_behavior_networks.h"
 #include "learner/parts/dual_behavior_objective.h"
@@ -37,22 +37,20 @@ namespace dbr {
 //
 // Departures: step 6 takes Q(s, a) from before step 2's gradient step, so that nothing is computed twice.
 template <class Scalar>
-class ContinuousDbr {
+class ContinuousDbr : public ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>> {
  public:
   explicit ContinuousDbr(const AlgorithmSpec& spec);
 
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return networks_.needs(); }
-  const std::vector<float>& advantages() const { return networks_.advantages; }
-  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const;
-  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
-  void Save(TensorFile* file) const { networks_.Save(file); }
-  absl::Status Load(const TensorFile& file) { return networks_.Load(file); }
 
  private:
+  using Base = ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>>;
+  using Base::metrics_;
+  using Base::networks_;
+
   const DbrConfig& config() const { return networks_.config(); }
   void FitBehaviors(const BasicBatch<Scalar>& plus, const BasicBatch<Scalar>& minus);
   // V'(s') [n] into next_value_.
@@ -67,7 +65,6 @@ class ContinuousDbr {
   void DrawDivergenceNoise(Eigen::Index n);
 
   PolicyLossOptions options_;
-  DualBehaviorNetworks<Scalar> networks_;
 
   GaussianLikelihood<Scalar> beta_plus_{kBehaviorLogStd}, beta_minus_{kBehaviorLogStd};
   CriticRegression<Scalar> regression_;
@@ -79,7 +76,6 @@ class ContinuousDbr {
   MatrixX<Scalar> next_noise_, d_output_;
   VectorX<Scalar> next_value_, value_, log_prob_, bonus_;
   SelfImitation<Scalar> imitation_;
-  std::vector<UpdateMetric> metrics_;
 };
 
 std::unique_ptr<Algorithm> MakeContinuousDbr(const AlgorithmSpec& spec);

@@ -7,10 +7,10 @@ namespace dbr {
 
 template <class Scalar>
 DiscreteBear<Scalar>::DiscreteBear(const AlgorithmSpec& spec)
-    : options_(PolicyLossOptions::Of(spec.config.bear())),
-      networks_(spec),
-      behavior_(networks_.policy.shape(), spec.config.learning_rate(), /*with_target=*/false, networks_.rng),
-      metrics_(networks_.Metrics()) {}
+    : Base(BearNetworks<Scalar>::Metrics(), spec),
+      options_(PolicyLossOptions::Of(spec.config.bear())),
+      behavior_(networks_.policy.shape(), spec.config.learning_rate(), /*with_target=*/false, networks_.rng) {
+}
 
 template <class Scalar>
 absl::Status DiscreteBear<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
@@ -57,7 +57,7 @@ ConstrainedLoss<Scalar> DiscreteBear<Scalar>::ImprovePolicy(const BasicBatch<Sca
 
 template <class Scalar>
 double DiscreteBear<Scalar>::UpdateFlops() const {
-  const Eigen::Index n = needs().uniform;
+  const Eigen::Index n = this->needs().uniform;
   // beta, pi' and pi, and the steps of beta and pi.
   const MlpShape& shape = networks_.policy.shape();
   return 3 * shape.ForwardFlops(n) + 2 * shape.ParameterGradientFlops(n) + networks_.critics.TargetFlops(n) +

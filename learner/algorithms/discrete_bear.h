@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "learner/algorithm.h"
+#include "learner/algorithms/actor_critic_algorithm.h"
 #include "learner/parts/bear_networks.h"
 #include "learner/parts/categorical_likelihood.h"
 #include "learner/parts/discrete_losses.h"
@@ -18,8 +18,7 @@ namespace dbr {
 //   2. y = r + discount * V'(s'), V' the expectation under pi' of 0.75 min_i Q'_i + 0.25 max_i Q'_i; each
 //      critic regresses on y.
 //   3. pi minimises -E[min_i E_pi Q_i] - entropy_weight * H(pi) + alpha * (D(pi, beta) - eps), D exact. In
-//   the
-//      first warm_start_updates the Q term is left out.
+//      the first warm_start_updates the Q term is left out.
 //   4. alpha ascends on alpha * (D(pi, beta) - eps).
 //   5. Polyak averaging of the critics and of pi.
 //   6. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin, V its expectation under pi.
@@ -27,7 +26,7 @@ namespace dbr {
 // softmax in place of the VAE. Steps 3 and 6 use beta's, the critics' and the policy's values from before
 // their steps of this update, so that nothing is computed twice.
 template <class Scalar>
-class DiscreteBear {
+class DiscreteBear : public ActorCriticAlgorithm<BearNetworks<Scalar>> {
  public:
   explicit DiscreteBear(const AlgorithmSpec& spec);
 
@@ -35,20 +34,20 @@ class DiscreteBear {
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return networks_.needs(); }
-  const std::vector<float>& advantages() const { return networks_.advantages; }
-  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const;
   void ExportPolicy(PolicySnapshot* snapshot) const;
   void Save(TensorFile* file) const;
   absl::Status Load(const TensorFile& file);
 
  private:
+  using Base = ActorCriticAlgorithm<BearNetworks<Scalar>>;
+  using Base::metrics_;
+  using Base::networks_;
+
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
   ConstrainedLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
 
   PolicyLossOptions options_;
-  BearNetworks<Scalar> networks_;
   TrainedNetwork<Scalar> behavior_;
 
   CategoricalLikelihood<Scalar> beta_;
@@ -56,7 +55,6 @@ class DiscreteBear {
   PolicyLossWorkspace<Scalar> workspace_;
   VectorX<Scalar> target_, value_;
   MatrixX<Scalar> d_logits_;
-  std::vector<UpdateMetric> metrics_;
 };
 
 std::unique_ptr<Algorithm> MakeDiscreteBear(const AlgorithmSpec& spec);

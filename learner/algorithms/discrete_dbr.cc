@@ -7,7 +7,8 @@
 namespace dbr {
 template <class Scalar>
 DiscreteDbr<Scalar>::DiscreteDbr(const AlgorithmSpec& spec)
-    : options_(PolicyLossOptions::Of(spec.config.dbr())), networks_(spec), metrics_(networks_.Metrics()) {}
+    : Base(DualBehaviorNetworks<Scalar>::Metrics(), spec),
+      options_(PolicyLossOptions::Of(spec.config.dbr())) {}
 
 template <class Scalar>
 absl::Status DiscreteDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
@@ -98,7 +99,7 @@ void DiscreteDbr<Scalar>::JudgeAndImitate(const BasicBatch<Scalar>& batch) {
 
 template <class Scalar>
 double DiscreteDbr<Scalar>::UpdateFlops() const {
-  const Eigen::Index n = needs().uniform;
+  const Eigen::Index n = this->needs().uniform;
   return networks_.critics.TargetFlops(n) + networks_.critics.FitFlops(n) + networks_.PolicyFlops();
 }
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "learner/algorithm.h"
+#include "learner/algorithms/actor_critic_algorithm.h"
 #include "learner/parts/categorical_likelihood.h"
 #include "learner/parts/discrete_losses.h"
 #include "learner/parts/dual_behavior_networks.h"
@@ -40,22 +40,20 @@ namespace dbr {
 // policy's from before step 3's, so that nothing is computed twice. entropy_weight adds the entropy term of
 // discrete SAC to step 3.
 template <class Scalar>
-class DiscreteDbr {
+class DiscreteDbr : public ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>> {
  public:
   explicit DiscreteDbr(const AlgorithmSpec& spec);
 
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return networks_.needs(); }
-  const std::vector<float>& advantages() const { return networks_.advantages; }
-  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const;
-  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
-  void Save(TensorFile* file) const { networks_.Save(file); }
-  absl::Status Load(const TensorFile& file) { return networks_.Load(file); }
 
  private:
+  using Base = ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>>;
+  using Base::metrics_;
+  using Base::networks_;
+
   const DbrConfig& config() const { return networks_.config(); }
   void FitBehaviors(const BasicBatch<Scalar>& plus, const BasicBatch<Scalar>& minus);
   void ComputeTargets(const BasicBatch<Scalar>& batch);
@@ -68,7 +66,6 @@ class DiscreteDbr {
   void JudgeAndImitate(const BasicBatch<Scalar>& batch);
 
   PolicyLossOptions options_;
-  DualBehaviorNetworks<Scalar> networks_;
 
   CategoricalLikelihood<Scalar> beta_plus_, beta_minus_;
   Categorical<Scalar> pi_, next_pi_;
@@ -76,7 +73,6 @@ class DiscreteDbr {
   VectorX<Scalar> target_, penalty_, log_prob_, bonus_, value_;
   SelfImitation<Scalar> imitation_;
   MatrixX<Scalar> d_logits_;
-  std::vector<UpdateMetric> metrics_;
 };
 
 std::unique_ptr<Algorithm> MakeDiscreteDbr(const AlgorithmSpec& spec);

@@ -6,9 +6,8 @@ namespace dbr {
 
 template <class Scalar>
 Sac<Scalar>::Sac(const AlgorithmSpec& spec)
-    : networks_(spec, spec.config.sac()),
-      target_entropy_(static_cast<Scalar>(spec.config.sac().target_entropy() * spec.actions.size)),
-      metrics_(networks_.Metrics()) {}
+    : Base(SoftNetworks<Scalar>::Metrics(), spec, spec.config.sac()),
+      target_entropy_(static_cast<Scalar>(spec.config.sac().target_entropy() * spec.actions.size)) {}
 
 template <class Scalar>
 absl::Status Sac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
@@ -49,7 +48,7 @@ SoftPolicyLoss<Scalar> Sac<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batc
 
 template <class Scalar>
 double Sac<Scalar>::UpdateFlops() const {
-  const Eigen::Index n = needs().uniform;
+  const Eigen::Index n = this->needs().uniform;
   return networks_.UpdateFlops(n) + networks_.critics.InputGradientFlops(n);
 }
 

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "learner/algorithm.h"
+#include "learner/algorithms/actor_critic_algorithm.h"
 #include "learner/parts/continuous_losses.h"
 #include "learner/parts/critic_regression.h"
 #include "learner/parts/sampled_actions.h"
@@ -24,7 +24,7 @@ namespace dbr {
 //   5. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin before its step, V at the action that
 //      step 2 drew.
 template <class Scalar>
-class Sac {
+class Sac : public ActorCriticAlgorithm<SoftNetworks<Scalar>> {
  public:
   explicit Sac(const AlgorithmSpec& spec);
 
@@ -32,19 +32,16 @@ class Sac {
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return networks_.needs(); }
-  const std::vector<float>& advantages() const { return networks_.advantages; }
-  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const;
-  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
-  void Save(TensorFile* file) const { networks_.Save(file); }
-  absl::Status Load(const TensorFile& file) { return networks_.Load(file); }
 
  private:
+  using Base = ActorCriticAlgorithm<SoftNetworks<Scalar>>;
+  using Base::metrics_;
+  using Base::networks_;
+
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
   SoftPolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
 
-  SoftNetworks<Scalar> networks_;
   Scalar target_entropy_;  // nats
 
   GaussianHead<Scalar> head_;
@@ -53,7 +50,6 @@ class Sac {
   CriticRegression<Scalar> regression_;
   MatrixX<Scalar> noise_, d_output_;
   VectorX<Scalar> next_value_, value_;
-  std::vector<UpdateMetric> metrics_;
 };
 
 std::unique_ptr<Algorithm> MakeSac(const AlgorithmSpec& spec);

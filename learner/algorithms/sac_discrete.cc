@@ -13,7 +13,7 @@ constexpr int kSmaller = 1;  // the weight of the smaller twin in a value: all
 
 template <class Scalar>
 SacDiscrete<Scalar>::SacDiscrete(const AlgorithmSpec& spec)
-    : networks_(spec, spec.config.sac_discrete()), metrics_(networks_.Metrics()) {}
+    : Base(SoftNetworks<Scalar>::Metrics(), spec, spec.config.sac_discrete()) {}
 
 template <class Scalar>
 absl::Status SacDiscrete<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "learner/algorithm.h"
+#include "learner/algorithms/actor_critic_algorithm.h"
 #include "learner/parts/soft_networks.h"
 #include "nn/categorical.h"
 
@@ -25,7 +25,7 @@ namespace dbr {
 // policy's from before step 2's, so that nothing is computed twice; the temperature is the exponential of
 // what Adam moves.
 template <class Scalar>
-class SacDiscrete {
+class SacDiscrete : public ActorCriticAlgorithm<SoftNetworks<Scalar>> {
  public:
   explicit SacDiscrete(const AlgorithmSpec& spec);
 
@@ -33,24 +33,19 @@ class SacDiscrete {
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return networks_.needs(); }
-  const std::vector<float>& advantages() const { return networks_.advantages; }
-  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
-  double UpdateFlops() const { return networks_.UpdateFlops(needs().uniform); }
-  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
-  void Save(TensorFile* file) const { networks_.Save(file); }
-  absl::Status Load(const TensorFile& file) { return networks_.Load(file); }
+  double UpdateFlops() const { return networks_.UpdateFlops(this->needs().uniform); }
 
  private:
+  using Base = ActorCriticAlgorithm<SoftNetworks<Scalar>>;
+  using Base::metrics_;
+  using Base::networks_;
+
   void ComputeTarget(const BasicBatch<Scalar>& batch);
   SoftPolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
-
-  SoftNetworks<Scalar> networks_;
 
   Categorical<Scalar> pi_, next_pi_;
   VectorX<Scalar> next_value_, target_, value_, entropy_;  // [n]
   MatrixX<Scalar> d_logits_;                               // [actions x n]
-  std::vector<UpdateMetric> metrics_;
 };
 
 std::unique_ptr<Algorithm> MakeSacDiscrete(const AlgorithmSpec& spec);

@@ -7,13 +7,14 @@ namespace dbr {
 
 template <class Scalar>
 Td3<Scalar>::Td3(const AlgorithmSpec& spec)
-    : networks_(spec, /*policy_target=*/true), metrics_{{"train/critic_loss"},
-                                                        {"train/actor_loss"},
-                                                        {"train/value_mean"},
-                                                        {"train/target_mean"},
-                                                        {"train/advantage_mean"},
-                                                        {"train/advantage_positive"},
-                                                        {"train/advantage_std"}} {
+    : Base({{"train/critic_loss"},
+            {"train/actor_loss"},
+            {"train/value_mean"},
+            {"train/target_mean"},
+            {"train/advantage_mean"},
+            {"train/advantage_positive"},
+            {"train/advantage_std"}},
+           spec, /*policy_target=*/true) {
   PinLogStd(networks_.policy.shape(), &networks_.policy.parameters());
   networks_.policy.ResetTarget();
 }
@@ -64,7 +65,7 @@ Scalar Td3<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
 
 template <class Scalar>
 double Td3<Scalar>::UpdateFlops() const {
-  const Eigen::Index n = needs().uniform;
+  const Eigen::Index n = this->needs().uniform;
   const TwinCritic<Scalar>& critics = networks_.critics;
   const MlpShape& policy = networks_.policy.shape();
   const double delayed = critics.FirstInputGradientFlops(n) + policy.ParameterGradientFlops(n);

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "learner/algorithm.h"
+#include "learner/algorithms/actor_critic_algorithm.h"
 #include "learner/parts/actor_critic.h"
 #include "learner/parts/critic_regression.h"
 #include "learner/parts/deterministic_policy.h"
@@ -24,7 +24,7 @@ namespace dbr {
 // Departures: of policy_delay updates the first, not the last, moves the policy; the noise of exploration is
 // the actors' (actor.mode MODE with actor.action_noise).
 template <class Scalar>
-class Td3 {
+class Td3 : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
  public:
   explicit Td3(const AlgorithmSpec& spec);
 
@@ -32,28 +32,23 @@ class Td3 {
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
                       const BasicBatch<Scalar>& minus);
 
-  BatchNeeds needs() const { return networks_.needs(); }
-  const std::vector<float>& advantages() const { return networks_.advantages; }
-  const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   double UpdateFlops() const;  // the mean over policy_delay updates
-  void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }
-  void Save(TensorFile* file) const { networks_.Save(file); }
-  absl::Status Load(const TensorFile& file) { return networks_.Load(file); }
 
  private:
+  using Base = ActorCriticAlgorithm<ActorCritic<Scalar>>;
+  using Base::metrics_;
+  using Base::networks_;
+
   const Td3Config& config() const { return networks_.spec.config.td3(); }
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
   // Steps 2 and 3; the policy's loss, also where it does not move.
   Scalar ImprovePolicy(const BasicBatch<Scalar>& batch);
-
-  ActorCritic<Scalar> networks_;
 
   GaussianHead<Scalar> pi_, next_pi_;
   DeterministicPolicyObjective<Scalar> objective_;
   CriticRegression<Scalar> regression_;
   MatrixX<Scalar> noise_, next_actions_, next_inputs_, d_output_;
   VectorX<Scalar> next_value_, value_;
-  std::vector<UpdateMetric> metrics_;
 };
 
 std::unique_ptr<Algorithm> MakeTd3(const AlgorithmSpec& spec);
