@@ -91,6 +91,12 @@ absl::Status Supervisor::Spawn(Child* child, bool again) {
   return absl::OkStatus();
 }
 
+// To follow the news of its end.
+std::string Supervisor::LastWords(const Child& child) {
+  const std::string lines = LogTail(child.spec.log, child.log_start);
+  return lines.empty() ? ", saying nothing" : absl::StrCat(", its last lines:\n", lines);
+}
+
 absl::Status Supervisor::Wait(absl::Time deadline) {
   RETURN_IF_ERROR(RestartDue());
   Poll(std::min(deadline, NextRestart()));
@@ -150,10 +156,8 @@ std::vector<EndedProcess> Supervisor::TakeEnded() {
 absl::Status Supervisor::OnDeath(Child* child, int wait_status) {
   const ProcessSpec& spec = child->spec;
   child->pid = 0;
-  const std::string lines = LogTail(spec.log, child->log_start);
   const std::string death = absl::StrCat(spec.name, " ", DescribeExit(wait_status));
-  const std::string failure =
-      absl::StrCat(death, lines.empty() ? ", saying nothing" : ", its last lines:\n", lines);
+  const std::string failure = absl::StrCat(death, LastWords(*child));
   if (first_failure_.empty()) first_failure_ = failure;
   if (WIFEXITED(wait_status) && WEXITSTATUS(wait_status) == kBadConfigExit) {
     options_.on_event(absl::StrCat(death, ": not started again"), /*notable=*/false);
@@ -256,7 +260,9 @@ bool Supervisor::ReapStopped(int rank, bool* clean) {
     child->pid = 0;
     if (status == 0) continue;
     *clean = false;
-    options_.on_event(absl::StrCat(child->spec.name, " ", DescribeExit(status), " when it was stopped"),
+    // It may have failed by itself just before, and be why the others did.
+    options_.on_event(absl::StrCat(child->spec.name, " ", DescribeExit(status), " when it was stopped",
+                                   WIFEXITED(status) ? LastWords(*child) : ""),
                       /*notable=*/true);
   }
   return running;

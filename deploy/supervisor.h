@@ -96,6 +96,7 @@ class Supervisor {
   Supervisor(SupervisorOptions options, std::unique_ptr<Guard> guard, int signal_fd, int wake_fd);
   absl::Status Spawn(Child* child, bool again);
   absl::Status RestartDue();
+  static std::string LastWords(const Child& child);
   absl::Status OnDeath(Child* child, int wait_status);
   void NoteEnd(Child* child, int wait_status);
   absl::Status ReapAll();

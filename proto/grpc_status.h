@@ -8,6 +8,7 @@
 namespace dbr {
 
 grpc::Status ToGrpc(const absl::Status& status);
+// gRPC says nothing of a server that lacks the service; here it says what that means.
 absl::Status FromGrpc(const grpc::Status& status);
 
 }  // namespace dbr

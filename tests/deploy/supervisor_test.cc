@@ -198,6 +198,20 @@ TEST_F(SupervisorTest, StopsOneRankAfterTheOther) {
   EXPECT_THAT(events_, IsEmpty());
 }
 
+// Another's death can come first that this one's failure caused.
+TEST_F(SupervisorTest, TellsWhyAChildFailedThatItMeantToStop) {
+  const auto supervisor = Make();
+  const Liveness liveness(folder_ / "alive");
+  ASSERT_TRUE(
+      supervisor
+          ->Start(Child("replay", {"say", "the address is in use", "hold", liveness.path(), "exit", "1"}))
+          .ok());
+  ASSERT_TRUE(liveness.HeldBy(1));
+  EXPECT_FALSE(supervisor->Stop());
+  EXPECT_THAT(events_, ElementsAre(AllOf(HasSubstr("replay exited with status 1 when it was stopped"),
+                                         HasSubstr("the address is in use"))));
+}
+
 TEST_F(SupervisorTest, KillsAChildThatDoesNotStop) {
   const auto supervisor = Make();
   ProcessSpec spec = Child("learner", {"ignore-sigterm"});

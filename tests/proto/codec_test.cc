@@ -224,5 +224,11 @@ TEST(GrpcStatusTest, EveryCodeAndMessageComesBack) {
   EXPECT_EQ(ToGrpc(absl::UnavailableError("x")).error_code(), grpc::StatusCode::UNAVAILABLE);
 }
 
+TEST(GrpcStatusTest, AServerWithoutTheServiceIsSaidToBeAnother) {
+  const absl::Status status = FromGrpc(grpc::Status(grpc::StatusCode::UNIMPLEMENTED, ""));
+  EXPECT_TRUE(absl::IsUnimplemented(status));
+  EXPECT_NE(status.message().find("another program"), std::string::npos) << status;
+}
+
 }  // namespace
 }  // namespace dbr
