@@ -46,7 +46,7 @@ struct SupervisorOptions {
       absl::Milliseconds(200);                     // doubles with each restart within the window
   absl::Duration orphan_grace = absl::Minutes(1);  // what children have to end when this process is killed
   // Called with one line at each start, death, restart and kill, from Start, Wait and Stop; `notable` where
-  // that was not asked for.
+  // that was not asked for. Below the line on a child that failed while it was stopped stand its last words.
   std::function<void(const std::string& event, bool notable)> on_event = [](const std::string&, bool) {};
 };
 

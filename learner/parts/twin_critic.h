@@ -93,9 +93,8 @@ class TwinCritic {
   }
   // Of Evaluate and InputGradient, where each sample's gradient goes through one of the two.
   double InputGradientFlops(Eigen::Index n) const { return 3 * shape().ForwardFlops(n); }
-  double FirstInputGradientFlops(Eigen::Index n) const {
-    return shape().ForwardFlops(n);
-  }  // without Evaluate
+  // Of FirstInputGradient, without Evaluate.
+  double FirstInputGradientFlops(Eigen::Index n) const { return shape().ForwardFlops(n); }
 
  private:
   struct Critic {
