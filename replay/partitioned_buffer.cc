@@ -146,6 +146,8 @@ absl::Status PartitionedBuffer::Insert(std::uint32_t place, InsertBatch* batch, 
     for (int rows = 0; rows < kRowsPerLock && SkipRows(place, refused, batch); ++rows) {
       if (rows > 0 && !CanInsert()) break;
       if (rows == 0) RETURN_IF_ERROR(AwaitInsert(deadline));
+      // While this one waited, another stream of the writer may have brought the same rows.
+      if (rows == 0 && !SkipRows(place, refused, batch)) break;
       InsertRow(place, *batch);
       while (end != batch->ends.end() && end->row < batch->next_row) ++end;
       if (end != batch->ends.end() && end->row == batch->next_row) store_->CountEpisode(end->end);

@@ -62,6 +62,26 @@ TEST_F(Buffer, AnInsertWaitsForDrawsAndGoesOnWhereItStopped) {
   EXPECT_EQ(buffer_->Stats().counters.duplicates, 0u);
 }
 
+// As when a connection breaks: the writer sends again on another one what the first still waits to store.
+TEST_F(Buffer, TwoStreamsOfOneWriterThatWaitTogetherStoreEachRowOnce) {
+  buffer_options_.limiter = {.samples_per_insert = 2, .tolerance = 20, .min_size = 10};
+  Make();
+  EXPECT_FALSE(Insert(1, 100).ok());  // 21 of them are in
+  std::vector<std::thread> streams;
+  for (int i = 0; i < 2; ++i)
+    streams.emplace_back([this] { EXPECT_TRUE(Insert(22, 40, kUnjudged, kNever).ok()); });
+  const auto waiting = [this] {
+    const std::vector<BlockedCalls> blocked = buffer_->Stats().blocked;
+    return blocked.empty() ? 0 : blocked[0].clients;
+  };
+  while (waiting() < 2) std::this_thread::yield();
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(Draw(40, 0, 0, true, kNever).ok());
+  for (std::thread& stream : streams) stream.join();
+  EXPECT_EQ(buffer_->Stats().total, 61u);
+  EXPECT_EQ(buffer_->Stats().counters.duplicates, 40u);
+  EXPECT_EQ(buffer_->Progress(place_).last_sequence, 61u);
+}
+
 TEST_F(Buffer, DuplicatesDoNotWaitForTheLimiter) {
   buffer_options_.limiter = {.samples_per_insert = 2, .tolerance = 20, .min_size = 10};
   Make();
