@@ -2,6 +2,7 @@
 
 #include "absl/time/clock.h"
 #include "proto/grpc_library.h"
+#include "proto/keepalive.h"
 
 namespace dbr {
 
@@ -15,6 +16,9 @@ std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address) {
   // for it.
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 5000);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveTimeMs);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // as many as it takes while a stream waits
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
 

@@ -15,6 +15,7 @@
 #include "absl/strings/strip.h"
 #include "core/status_macros.h"
 #include "proto/grpc_library.h"
+#include "proto/keepalive.h"
 
 namespace dbr {
 namespace {
@@ -40,6 +41,14 @@ bool SocketIsServed(const std::string& path) {
   const bool served = connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   close(fd);
   return served;
+}
+
+// gRPC does not say why it could not listen.
+absl::Status CannotListen(absl::string_view address) {
+  return absl::AlreadyExistsError(
+      absl::StrCat("cannot listen on ", address,
+                   ": the address is in use, or is none that this user may open on this machine. Stop the "
+                   "program that serves it or choose another address."));
 }
 
 absl::Status AddressInUse(absl::string_view address) {
@@ -96,11 +105,15 @@ absl::StatusOr<RunningServer> StartServer(const ServerOptions& options,
   int port = 0;
   builder.AddListeningPort(options.address, grpc::InsecureServerCredentials(), &port);
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveTimeMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  // How often a client may ask: more often than it does.
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kKeepaliveTimeMs / 2);
   builder.SetMaxReceiveMessageSize(kMaxMessageBytes);
   for (grpc::Service* service : services) builder.RegisterService(service);
   RunningServer running;
   running.server = builder.BuildAndStart();
-  if (running.server == nullptr || port == 0) return AddressInUse(options.address);
+  if (running.server == nullptr || port == 0) return CannotListen(options.address);
   running.address = options.address;
   if (absl::EndsWith(options.address, ":0")) {
     running.address = absl::StrCat(absl::StripSuffix(options.address, "0"), port);
