@@ -15,6 +15,7 @@
 #include "proto/channel.h"
 #include "proto/config_file.h"
 #include "proto/grpc_status.h"
+#include "replay/await_stats.h"
 #include "replay/client.h"
 
 namespace dbr {
@@ -25,7 +26,6 @@ constexpr std::uint64_t kEvaluatorStream = 1 << 19;  // of the config's seed
 constexpr std::size_t kBufferedSteps = 16;           // of each environment, where the config leaves it open
 constexpr absl::Duration kStopCheck = absl::Milliseconds(100);
 constexpr absl::Duration kReportTimeout = absl::Seconds(5);
-constexpr absl::Duration kStatsTimeout = absl::Seconds(5);
 
 Rng ActorRng(const ActorOptions& options) {
   return Rng(options.config.seed()).Fork(kActorStream + options.index);
@@ -116,9 +116,10 @@ absl::Status Actor::Act() {
   ASSIGN_OR_RETURN(const PolicySubscriber::PolicyPtr first,
                    subscriber_->WaitForFirst(absl::InfiniteDuration()));
   spdlog::info("acting in {} environments, from policy version {}", envs_->size(), first->snapshot().version);
+  ASSIGN_OR_RETURN(const ExplorationOptions exploring, Exploring());
   const ActorConfig& actor = options_.config.actor();
   const StepLoopOptions stepping = {.mode = actor.mode(),
-                                    .exploration = Exploring(),
+                                    .exploration = exploring,
                                     .discount = options_.config.algorithm().discount(),
                                     .with_returns = NeedsReturns(options_.config.algorithm()),
                                     .reward_scale = options_.config.algorithm().reward_scale()};
@@ -144,19 +145,16 @@ absl::Status Actor::Act() {
 
 // Where epsilon decays, the replay server knows how far the run has come: an actor that starts again, or in a
 // run that is resumed, goes on from there.
-ExplorationOptions Actor::Exploring() const {
+absl::StatusOr<ExplorationOptions> Actor::Exploring() const {
   const ActorConfig& actor = options_.config.actor();
   ExplorationOptions exploring = ExplorationOptions::Of(actor);
   const int processes = options_.processes > 0 ? options_.processes : static_cast<int>(actor.processes());
   exploring.processes = std::max(1, processes);
   if (exploring.epsilon_decay_steps == 0) return exploring;
-  const absl::StatusOr<StatsReply> stats = ReplayClient(options_.replay_address).Stats(kStatsTimeout);
-  if (stats.ok()) {
-    exploring.first_step = stats->inserted();
-  } else {
-    spdlog::warn("the replay server does not say how many steps there were: epsilon starts at {}. {}",
-                 exploring.epsilon, std::string(stats.status().message()));
-  }
+  ReplayClient replay(options_.replay_address);
+  ASSIGN_OR_RETURN(const StatsReply stats,
+                   AwaitStats(&replay, "to hear how many steps the run has made", stopping_));
+  exploring.first_step = stats.inserted();
   return exploring;
 }
 

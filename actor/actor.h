@@ -49,7 +49,7 @@ class Actor {
   Actor(const ActorOptions& options, std::unique_ptr<VectorEnv> envs);
 
   absl::Status Act();
-  ExplorationOptions Exploring() const;
+  absl::StatusOr<ExplorationOptions> Exploring() const;
   absl::Status Write(const TransitionView& transition, float advantage, std::uint64_t critic_version,
                      const std::optional<EpisodeEnd>& end);
   void Drain();

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <atomic>
 #include <filesystem>
 #include <string>
 
@@ -20,12 +21,12 @@
 #include "proto/config_file.h"
 #include "proto/server.h"
 #include "proto/service_main.h"
+#include "replay/await_stats.h"
 
 namespace dbr {
 namespace {
 
 constexpr absl::Duration kMetricsFlush = absl::Seconds(2);
-constexpr absl::Duration kFirstStatsTimeout = absl::Seconds(5);
 constexpr absl::Duration kRolloutPeriod = absl::Seconds(5);
 
 struct Arguments : ServiceArguments {
@@ -65,6 +66,21 @@ absl::Status Resume(const RunFolder& folder, const LearnerConfig& config, Traine
   return absl::OkStatus();
 }
 
+// Labels that the replay has may be newer than what `trainer` goes on from, and it refuses older ones: no
+// training before it has told of them. Blocks until then, or until a signal has stopped the trainer.
+absl::Status ContinueVersions(ReplayClient* replay, Trainer* trainer) {
+  std::atomic<bool> stopping = false;
+  const ShutdownWatcher watcher([&] {
+    stopping = true;
+    trainer->Stop();
+  });
+  const absl::StatusOr<StatsReply> stats = AwaitStats(replay, "to hear of its newest labels", stopping);
+  if (stopping) return absl::OkStatus();
+  RETURN_IF_ERROR(stats.status());
+  trainer->StartVersionsAfter(stats->newest_critic_version());
+  return absl::OkStatus();
+}
+
 void WriteEvaluation(const EvaluationReport& report, MetricsSink* metrics) {
   const std::string against = report.opponent().empty() ? "" : absl::StrCat("/", report.opponent());
   Scalars scalars = {{absl::StrCat(tags::kEvaluationReturn, against), report.return_mean()}};
@@ -101,10 +117,7 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
                                 .depth = static_cast<int>(learner.prefetch())});
   Trainer trainer(learner, std::move(parts));
   if (arguments.resume) RETURN_IF_ERROR(Resume(arguments.folder, learner, &trainer));
-
-  if (const auto newest = stats.Stats(kFirstStatsTimeout); newest.ok()) {
-    trainer.StartVersionsAfter(newest->newest_critic_version());
-  }
+  RETURN_IF_ERROR(ContinueVersions(&stats, &trainer));
   ASSIGN_OR_RETURN(
       const RunningServer running,
       StartServer({arguments.address, arguments.allow_insecure || learner.allow_insecure()}, {&service}));
