@@ -27,8 +27,11 @@ bool Saver::Offer(Checkpoint checkpoint) {
 
 absl::Status Saver::SaveNow(const Checkpoint& checkpoint) {
   absl::MutexLock lock(&writing_);
+  if (checkpoint.updates < written_) return absl::OkStatus();
   RETURN_IF_ERROR(checkpoints_.Save(checkpoint.updates, checkpoint.state));
-  return SavePolicy(checkpoint.policy, folder_.latest_policy());
+  RETURN_IF_ERROR(SavePolicy(checkpoint.policy, folder_.latest_policy()));
+  written_ = checkpoint.updates;
+  return absl::OkStatus();
 }
 
 void Saver::Run() {

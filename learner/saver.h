@@ -29,9 +29,10 @@ class Saver {
   Saver(const RunFolder& folder, int keep);
   ~Saver();  // finishes the write under way and joins
 
-  // Does not block; false, and nothing is written, where a write is still under way.
+  // Does not block; false, and nothing is written, where the one offered before still waits its turn.
   bool Offer(Checkpoint checkpoint);
-  // Writes now, after what is under way, in the calling thread.
+  // Writes now, after what is under way, in the calling thread; what was offered earlier and waits is written
+  // no more.
   absl::Status SaveNow(const Checkpoint& checkpoint);
 
  private:
@@ -40,6 +41,7 @@ class Saver {
   const RunFolder folder_;
   absl::Mutex writing_;
   Checkpoints checkpoints_ ABSL_GUARDED_BY(writing_);
+  std::uint64_t written_ ABSL_GUARDED_BY(writing_) = 0;  // the updates of the newest one on disk
   BoundedQueue<Checkpoint> queue_;
   std::thread thread_;
 };

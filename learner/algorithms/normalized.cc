@@ -17,6 +17,7 @@ class FeatureStatistics {
   explicit FeatureStatistics(int features)
       : mean_(VectorX<float>::Zero(features)),
         variance_(VectorX<float>::Ones(features)),
+        scale_(VectorX<float>::Ones(features)),
         batch_mean_(features) {}
 
   void Add(const MatrixX<float>& columns) {
@@ -31,14 +32,15 @@ class FeatureStatistics {
       mean_[i] += share * difference;
     }
     count_ += static_cast<std::uint64_t>(columns.cols());
+    SetScale();
   }
 
   void Apply(const MatrixX<float>& columns, MatrixX<float>* normalized) const {
-    *normalized = ((columns.colwise() - mean_).array().colwise() * scale().array()).matrix();
+    *normalized = ((columns.colwise() - mean_).array().colwise() * scale_.array()).matrix();
   }
 
   const VectorX<float>& mean() const { return mean_; }
-  VectorX<float> scale() const { return variance_.cwiseSqrt().cwiseMax(kLeastDeviation).cwiseInverse(); }
+  const VectorX<float>& scale() const { return scale_; }
 
   void Save(TensorFile* file) const {
     PutTensor("observation.mean", mean_, file);
@@ -49,11 +51,14 @@ class FeatureStatistics {
     absl::Status status = GetTensor("observation.mean", file, &mean_);
     status.Update(GetTensor("observation.variance", file, &variance_));
     status.Update(GetCounter("observation.count", file, &count_));
+    SetScale();
     return status;
   }
 
  private:
-  VectorX<float> mean_, variance_, batch_mean_;  // [features]
+  void SetScale() { scale_ = variance_.cwiseSqrt().cwiseMax(kLeastDeviation).cwiseInverse(); }
+
+  VectorX<float> mean_, variance_, scale_, batch_mean_;  // [features]
   std::uint64_t count_ = 0;
 };
 

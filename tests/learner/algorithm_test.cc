@@ -10,6 +10,7 @@
 
 #include "absl/strings/match.h"
 #include "learner/algorithms/discrete_dbr.h"
+#include "learner/parts/learning_rate.h"
 #include "nn/policy.h"
 #include "tests/learner/allocation_count.h"
 #include "tests/learner/batches.h"
@@ -44,23 +45,25 @@ struct Member {
 struct Variant {
   const char* name;
   const char* algorithm;
-  void (*set)(AlgorithmConfig* config);
+  void (*set)(AlgorithmSpec* spec);
 };
 
 constexpr Variant kVariants[] = {
-    {"Sil", "dbr", [](AlgorithmConfig* config) { config->mutable_dbr()->set_advantage(DbrConfig::SIL); }},
+    {"Sil", "dbr", [](AlgorithmSpec* spec) { spec->config.mutable_dbr()->set_advantage(DbrConfig::SIL); }},
     {"Mrl", "dbr",
-     [](AlgorithmConfig* config) {
-       config->mutable_dbr()->set_constraint(DbrConfig::NONE);
-       config->mutable_dbr()->set_munchausen_weight(0.9);
-       config->mutable_dbr()->set_entropy_weight(0.1);
+     [](AlgorithmSpec* spec) {
+       DbrConfig* dbr = spec->config.mutable_dbr();
+       dbr->set_constraint(DbrConfig::NONE);
+       dbr->set_munchausen_weight(0.9);
+       dbr->set_entropy_weight(0.1);
      }},
+    {"Normalized", "dbr", [](AlgorithmSpec* spec) { spec->normalize_observations = true; }},
 };
 
 AlgorithmSpec SpecOf(const Member& member, std::uint64_t seed = 1) {
   AlgorithmSpec spec = SpecOf(member.id, seed);
   for (const Variant& variant : kVariants) {
-    if (member.variant == variant.name) variant.set(&spec.config);
+    if (member.variant == variant.name) variant.set(&spec);
   }
   return spec;
 }
@@ -226,6 +229,48 @@ INSTANTIATE_TEST_SUITE_P(Registry, Conformance, testing::ValuesIn(Members()), []
   const AlgorithmId& id = info.param.id;
   return id.name + (id.actions == ActionKind::kDiscrete ? "Discrete" : "Continuous") + info.param.variant;
 });
+
+TEST(LearningRateTest, FallsLinearlyToItsEndAndStaysThere) {
+  AlgorithmConfig config;
+  config.set_learning_rate(0.1);
+  config.set_final_learning_rate(0.02);
+  EXPECT_EQ(LearningRate(config, 1000), 0.1) << "it never falls";
+  config.set_learning_rate_decay_updates(40);
+  EXPECT_EQ(LearningRate(config, 0), 0.1);
+  EXPECT_NEAR(LearningRate(config, 10), 0.08, 1e-12);
+  EXPECT_NEAR(LearningRate(config, 39), 0.022, 1e-12);
+  EXPECT_EQ(LearningRate(config, 40), 0.02);
+  EXPECT_EQ(LearningRate(config, 1000), 0.02);
+}
+
+// A rate that has fallen to 0 moves nothing more.
+TEST(LearningRateTest, ThatHasFallenTo0MovesNoPolicy) {
+  for (const AlgorithmId& id : Algorithms()) {
+    std::vector<float> policies[2];
+    for (const int decayed : {0, 1}) {
+      AlgorithmSpec spec = SpecOf(id);
+      if (decayed == 1) {
+        spec.config.set_learning_rate_decay_updates(2);
+        spec.config.set_final_learning_rate(0);
+      }
+      const auto algorithm = MakeAlgorithm(spec);
+      ASSERT_TRUE(algorithm.ok()) << algorithm.status();
+      Rng rng(5);
+      PolicySnapshot before, after;
+      for (int i = 0; i < 6; ++i) {
+        const Batch batch = RandomBatch<float>(spec, 16, rng);
+        if (i == 2) (*algorithm)->ExportPolicy(&before);
+        ASSERT_TRUE((*algorithm)->Update({batch, batch, batch}).ok());
+      }
+      (*algorithm)->ExportPolicy(&after);
+      if (decayed == 1) {
+        EXPECT_EQ(*before.Find(kPolicyNetwork), *after.Find(kPolicyNetwork)) << id.name;
+      }
+      policies[decayed] = *after.Find(kPolicyNetwork);
+    }
+    EXPECT_NE(policies[0], policies[1]) << id.name;
+  }
+}
 
 TEST(Registry, RefusesAnActionSpaceThatTheAlgorithmDoesNotServe) {
   AlgorithmSpec spec = SmallSpec();

@@ -170,6 +170,14 @@ TEST_F(TrainerTest, ContinuesFromItsCheckpoint) {
   RunToTheEnd(MakeTrainer(kUpdates).get());
   const auto saved = Checkpoints(RunFolder{folder_.path()}.checkpoints(), 3).LoadNewest();
   ASSERT_TRUE(saved.ok()) << saved.status();
+  auto same = MakeTrainer(kUpdates);
+  ASSERT_TRUE(same->Load(saved->file).ok());
+  RunToTheEnd(same.get());  // makes no update, and saves
+  same.reset();             // before what it draws from
+  const auto saved_again = Checkpoints(RunFolder{folder_.path()}.checkpoints(), 3).LoadNewest();
+  ASSERT_TRUE(saved_again.ok()) << saved_again.status();
+  EXPECT_NE(saved_again->file.metadata, saved->file.metadata) << "of the same save: versions must go on";
+  EXPECT_EQ(saved_again->file.tensors, saved->file.tensors);
   const auto policy_before = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
   const auto again = MakeTrainer(2 * kUpdates);
   ASSERT_TRUE(again->Load(saved->file).ok());
@@ -179,6 +187,19 @@ TEST_F(TrainerTest, ContinuesFromItsCheckpoint) {
   const auto policy_after = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
   ASSERT_TRUE(policy_before.ok() && policy_after.ok());
   EXPECT_GT(policy_after->version, policy_before->version);
+}
+
+TEST(SaverTest, WhatComesLateDoesNotTakeThePlaceOfWhatIsNewer) {
+  const TempDir folder;
+  Saver saver(RunFolder{folder.path()}, 3);
+  Checkpoint checkpoint;
+  MakeAlgorithm(SmallSpec()).value()->ExportPolicy(&checkpoint.policy);
+  for (const std::uint64_t updates : {20, 10, 30}) {
+    checkpoint.updates = checkpoint.policy.updates = updates;
+    ASSERT_TRUE(saver.SaveNow(checkpoint).ok());
+    EXPECT_EQ(LoadPolicy(RunFolder{folder.path()}.latest_policy())->updates,
+              std::max<std::uint64_t>(20, updates));
+  }
 }
 
 TEST_F(TrainerTest, VersionsGoOnAfterTheNewestThatTheReplayHasSeen) {
