@@ -65,8 +65,8 @@ absl::Status Rename(const std::string& from, const std::string& to) {
 
 CellStanding ReadStanding(const Cell& cell) {
   CellStanding standing;
-  if (!HasBegun(cell)) return standing;
   const RunFolder folder{cell.folder};
+  if (!Exists(folder.config())) return standing;
   standing.summary = ReadSummary(folder);
   standing.difference = DifferenceFrom(cell);
   if (InUse(folder)) {
@@ -77,10 +77,6 @@ CellStanding ReadStanding(const Cell& cell) {
     standing.state = StateOf(standing.summary, folder);
   }
   return standing;
-}
-
-bool HasBegun(const Cell& cell) {
-  return Exists(RunFolder{cell.folder}.config());
 }
 
 std::string StateText(CellState state) {
@@ -98,7 +94,7 @@ std::string StateText(CellState state) {
     case CellState::kBusy:
       break;
   }
-  return "in use by another launch";
+  return "in use elsewhere";
 }
 
 std::string ResultText(const RunSummary& summary) {

@@ -33,10 +33,7 @@ struct CellStanding {
 // Reads the cell's folder and compares its config with the cell's (deploy/same_run.h).
 CellStanding ReadStanding(const Cell& cell);
 
-// Whether the cell's folder has a run, of whatever config.
-bool HasBegun(const Cell& cell);
-
-// "to start", "to continue", "failed, to continue", "done", "of another config", "in use by another launch".
+// "to start", "to continue", "failed, to continue", "done", "of another config", "in use elsewhere".
 std::string StateText(CellState state);
 
 // Of a run that has its final results: "return 812.3 ± 20.1" with the standard deviation of an episode, or a

@@ -10,12 +10,13 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "absl/strings/strip.h"
+#include "actor/evaluation_loop.h"
 #include "core/run_folder.h"
 #include "core/space.h"
 #include "deploy/experiment_cell.h"
 #include "deploy/run_plan.h"
-#include "learner/algorithm.h"
 #include "proto/config_fields.h"
 #include "proto/config_file.h"
 
@@ -90,6 +91,19 @@ void CheckContender(const Experiment& experiment, const Contender& contender,
                                  Suggest(contender.ablation_of(), others)));
 }
 
+void CheckPublished(const Task& task, const std::vector<std::string>& contenders,
+                    std::vector<std::string>* errors) {
+  for (const Measure& measure : task.measure()) {
+    for (const Published& published : measure.published()) {
+      if (std::find(contenders.begin(), contenders.end(), published.contender()) != contenders.end())
+        continue;
+      errors->push_back(absl::StrCat("task '", task.name(), "': measure.published.contender: expected a ",
+                                     "contender's name, found '", published.contender(), "'; ",
+                                     Suggest(published.contender(), contenders)));
+    }
+  }
+}
+
 // The environments of cells, each made once.
 class EnvSpecs {
  public:
@@ -107,6 +121,19 @@ bool Ends(const Config& config) {
   const LaunchConfig& limits = config.launch();
   return config.learner().max_updates() > 0 || limits.max_episodes() > 0 || limits.max_steps() > 0 ||
          limits.max_seconds() > 0;
+}
+
+// A row of the report that the final evaluation would leave empty; "" where there is none.
+std::string WrongMeasure(const Task& task, const Config& config, const EnvSpec& env) {
+  const auto& named = config.evaluation().final_opponents();
+  const std::vector<std::string> met = OpponentsToEvaluate(env.name, {named.begin(), named.end()});
+  for (const Measure& measure : task.measure()) {
+    const std::string& opponent = measure.opponent();
+    if (opponent.empty() || std::find(met.begin(), met.end(), opponent) != met.end()) continue;
+    return absl::StrCat("measure.opponent: expected one of the final evaluation's (",
+                        absl::StrJoin(met, ", "), "), found '", opponent, "'");
+  }
+  return "";
 }
 
 // Whether a task of kind OFFLINE is one; "" where it is.
@@ -154,19 +181,24 @@ std::vector<std::string> FindGridErrors(const Experiment& experiment) {
                                     "config are moved to a folder of this one"));
   }
   for (const Contender& contender : experiment.contender()) CheckContender(experiment, contender, &errors);
+  const std::vector<std::string> contenders = NamesOf(experiment.contender());
+  for (const Task& task : experiment.task()) CheckPublished(task, contenders, &errors);
   return errors;
 }
 
-void FindPairErrors(const std::vector<Cell>& first_cells, std::vector<std::string>* errors) {
+void FindPairErrors(const Experiment& experiment, const std::vector<Cell>& first_cells,
+                    std::vector<std::string>* errors) {
   EnvSpecs specs;
   for (const Cell& cell : first_cells) {
     const auto note = [&](absl::string_view what) {
       errors->push_back(absl::StrCat("task '", cell.task, "', contender '", cell.contender, "': ", what));
     };
     const absl::StatusOr<EnvSpec>& env = specs.Of(cell.config);
-    const absl::Status served =
-        env.ok() ? CheckServes(cell.config.algorithm(), env->name, env->actions) : env.status();
-    if (!served.ok()) note(served.message());
+    const absl::Status fits = env.ok() ? CheckFits(cell.config, *env) : env.status();
+    if (!fits.ok()) note(fits.message());
+    const std::string measure =
+        fits.ok() ? WrongMeasure(TaskOf(experiment, cell), cell.config, *env) : std::string();
+    if (!measure.empty()) note(measure);
     const std::string offline = cell.kind == Task::OFFLINE ? WrongOffline(cell.config) : "";
     if (!offline.empty()) {
       note(offline);
@@ -183,8 +215,8 @@ void FindCellErrors(const Experiment& experiment, const std::vector<Cell>& cells
   std::set<std::string> missing;
   for (const Cell& cell : cells) {
     const std::string& path = cell.config.replay().seed().path();
-    if (path.empty() || HasBegun(cell) || std::filesystem::exists(path) || !missing.insert(path).second)
-      continue;
+    if (path.empty() || std::filesystem::exists(path)) continue;
+    if (ReadStanding(cell).state != CellState::kNew || !missing.insert(path).second) continue;
     errors->push_back(absl::StrCat("task '", cell.task, "': expected its seed buffer, found no file '", path,
                                    "'", RecordCommand(TaskOf(experiment, cell), path)));
   }

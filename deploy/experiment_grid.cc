@@ -127,7 +127,7 @@ absl::StatusOr<Grid> MakeGrid(const Experiment& experiment, const GridOptions& o
   if (grid.run_dir.empty()) grid.run_dir = absl::StrCat("runs/", grid.name, "-", grid.scale);
   const std::uint32_t seeds = options.seeds > 0 ? options.seeds : scale->seeds();
   const std::vector<Cell> first_cells = FirstCells(experiment, *scale, options);
-  FindPairErrors(first_cells, &errors);
+  FindPairErrors(experiment, first_cells, &errors);
   grid.cells = AllSeeds(first_cells, seeds, grid.run_dir);
   Choose(options.only, experiment, &grid.cells, &errors);
   FindCellErrors(experiment, grid.cells, &errors);

@@ -27,6 +27,15 @@ bool WasStopped(int wait_status) {
   return WIFSIGNALED(wait_status) || WEXITSTATUS(wait_status) == kInterruptedExit;
 }
 
+// Before what stands in the cell's place is moved away for a run that could not begin.
+absl::Status CheckSeedIsThere(const Cell& cell) {
+  const std::string& path = cell.config.replay().seed().path();
+  std::error_code ignored;
+  if (path.empty() || std::filesystem::exists(path, ignored)) return absl::OkStatus();
+  return absl::NotFoundError(
+      absl::StrCat("expected its seed buffer, found no file '", path, "'; nothing was changed"));
+}
+
 }  // namespace
 
 ExperimentRun::ExperimentRun(Grid grid, ExperimentOptions options, std::FILE* out)
@@ -128,6 +137,7 @@ absl::Status ExperimentRun::Start(Entry* entry) {
   const bool resume = standing.state == CellState::kInterrupted || standing.state == CellState::kFailed;
   entry->before = resume ? standing.summary : RunSummary();
   if (!resume) {
+    RETURN_IF_ERROR(CheckSeedIsThere(cell));
     ASSIGN_OR_RETURN(const std::string aside, MoveAside(cell, run_dir_));
     if (!aside.empty()) board_.Say(absl::StrCat(cell.name(), ": what was there is now in ", aside));
   }
@@ -177,6 +187,8 @@ void ExperimentRun::Judge(Entry* entry, const EndedProcess& ended) {
   }
   if (supervisor_->stop_signals() > 0 && WasStopped(ended.wait_status)) {
     entry->outcome = Outcome::kWaiting;
+    if (WIFSIGNALED(ended.wait_status))
+      board_.Say(absl::StrCat("killed ", cell.name(), ": it goes on from its last checkpoint"));
     return;
   }
   const std::string words = LogTail(cell.log(), ended.log_start, kLastLines);
@@ -254,8 +266,7 @@ int ExperimentRun::Conclude(bool signalled) {
       absl::StrCat(title_, ": ", Count(Outcome::kDone), " of ", entries_.size(), " cells done");
   if (failed > 0) absl::StrAppend(&text, ", ", failed, " failed");
   if (left_alone > 0) absl::StrAppend(&text, ", ", left_alone, " left alone");
-  if (waiting > 0)
-    absl::StrAppend(&text, ", ", waiting, " still to run; all is saved, and the same command goes on");
+  if (waiting > 0) absl::StrAppend(&text, ", ", waiting, " still to run; the same command goes on");
   for (const Entry& entry : entries_) {
     if (entry.outcome == Outcome::kFailed) absl::StrAppend(&text, "\n  failed: ", entry.cell.log());
   }

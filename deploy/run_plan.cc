@@ -12,6 +12,7 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
+#include "actor/evaluator.h"
 #include "actor/exploration.h"
 #include "core/file_io.h"
 #include "core/status_macros.h"
@@ -90,6 +91,37 @@ absl::Status CheckSeed(const Config& config, const EnvSpec& env) {
                        config.replay().capacity());
 }
 
+// Before hours of training, at whose end alone some of them are met.
+absl::Status CheckOpponents(const std::string& env, const char* field,
+                            const google::protobuf::RepeatedPtrField<std::string>& opponents) {
+  const absl::Status known =
+      MakeEnv({.name = env, .opponents = {opponents.begin(), opponents.end()}}).status();
+  return known.ok() ? known : absl::Status(known.code(), absl::StrCat(field, ": ", known.message()));
+}
+
+// SUPPORT looks at beta+ and beta- of each action, which DBR over discrete actions alone has.
+absl::Status CheckMode(const Config& config, const EnvSpec& env, const char* field, ActingMode mode) {
+  if (mode != SUPPORT) return absl::OkStatus();
+  if (env.actions.kind == ActionKind::kDiscrete && AlgorithmName(config) == "dbr") return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      field, ": expected SAMPLE, MODE or GREEDY_Q, for SUPPORT is for dbr over discrete actions ",
+      "alone; found SUPPORT with ", AlgorithmName(config), " on ", env.name));
+}
+
+absl::Status CheckEpisodes(const char* field, std::uint32_t episodes) {
+  if (episodes <= kMaxEpisodes) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(field, ": expected 1 to ", kMaxEpisodes, ", found ", episodes));
+}
+
+// Whether there is anything that a launch could go on with.
+bool HasBegun(const RunFolder& folder) {
+  std::error_code ignored;
+  return std::filesystem::exists(folder.replay_store(), ignored) ||
+         (std::filesystem::exists(folder.checkpoints(), ignored) &&
+          !std::filesystem::is_empty(folder.checkpoints(), ignored));
+}
+
 absl::Status CheckRunFolder(const RunFolder& folder) {
   if (std::filesystem::exists(folder.config())) return absl::OkStatus();
   return absl::NotFoundError(absl::StrCat("--resume: '", folder.root,
@@ -150,14 +182,14 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
   if (options.resume) RETURN_IF_ERROR(CheckRunFolder(RunFolder{options.run_dir}));
   ASSIGN_OR_RETURN(plan.config, LoadForLaunch(options));
   ASSIGN_OR_RETURN(plan.env, EnvSpecOf(plan.config));
-  RETURN_IF_ERROR(CheckServes(plan.config.algorithm(), plan.env.name, plan.env.actions));
-  RETURN_IF_ERROR(CheckExploration(plan.env, plan.config.actor()));
+  RETURN_IF_ERROR(CheckFits(plan.config, plan.env));
   plan.folder.root = options.run_dir.empty() ? DefaultRunDir(plan.config, now) : options.run_dir;
   plan.config_source = options.config.empty() ? plan.folder.config() : options.config;
-  plan.resume = options.resume;
+  plan.resume = options.resume && HasBegun(plan.folder);
   if (plan.resume) {
     RETURN_IF_ERROR(CheckResumable(plan.folder, plan.config));
-  } else if (std::filesystem::exists(plan.folder.root) && !std::filesystem::is_empty(plan.folder.root)) {
+  } else if (!options.resume && std::filesystem::exists(plan.folder.root) &&
+             !std::filesystem::is_empty(plan.folder.root)) {
     return absl::AlreadyExistsError(
         absl::StrCat("run folder '", plan.folder.root,
                      "' exists already. Say --resume to continue it, or choose another --run-dir."));
@@ -212,6 +244,18 @@ absl::StatusOr<EnvSpec> EnvSpecOf(const Config& config) {
       MakeEnv({.name = config.env().name(),
                .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
   return env->spec();
+}
+
+absl::Status CheckFits(const Config& config, const EnvSpec& env) {
+  RETURN_IF_ERROR(CheckServes(config.algorithm(), env.name, env.actions));
+  RETURN_IF_ERROR(CheckExploration(env, config.actor()));
+  const EvaluationConfig& evaluation = config.evaluation();
+  RETURN_IF_ERROR(CheckMode(config, env, "actor.mode", config.actor().mode()));
+  RETURN_IF_ERROR(CheckMode(config, env, "evaluation.mode", evaluation.mode()));
+  RETURN_IF_ERROR(CheckEpisodes("evaluation.episodes", evaluation.episodes()));
+  RETURN_IF_ERROR(CheckEpisodes("evaluation.final_episodes", evaluation.final_episodes()));
+  RETURN_IF_ERROR(CheckOpponents(env.name, "evaluation.opponents", evaluation.opponents()));
+  return CheckOpponents(env.name, "evaluation.final_opponents", evaluation.final_opponents());
 }
 
 int ActorProcesses(const Config& config) {

@@ -50,10 +50,11 @@ struct RunPlan {
 };
 
 // Loads and checks the config, makes the folder or checks that it can be continued, and writes the effective
-// config. Errors: InvalidArgument for a bad config or seed, an algorithm that does not serve the actions, or
-// a config that differs from the folder's where that would not continue the same run (each field is named);
-// AlreadyExists where the folder is there and `resume` was not said; NotFound where there is nothing to
-// resume; FailedPrecondition where another launch uses the folder.
+// config. A folder whose run never came to have anything to go on with is begun anew by `resume`. Errors:
+// InvalidArgument for a bad config or seed, what does not fit the environment (CheckFits), or a config that
+// differs from the folder's where that would not continue the same run (each field is named); AlreadyExists
+// where the folder is there and `resume` was not said; NotFound where there is nothing to resume;
+// FailedPrecondition where another launch uses the folder.
 absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now);
 
 // In which order processes are stopped: each saves its state while what it needs is still there.
@@ -66,6 +67,10 @@ std::vector<ProcessSpec> Actors(const RunPlan& plan, const std::string& programs
 
 // The environment that a config names. InvalidArgument where there is none.
 absl::StatusOr<EnvSpec> EnvSpecOf(const Config& config);
+
+// InvalidArgument where the algorithm does not serve the actions of `env`, how actors or the evaluator are to
+// choose is not for them, or an evaluation has too many episodes or an opponent that `env` does not have.
+absl::Status CheckFits(const Config& config, const EnvSpec& env);
 
 // How many a launch of `config` starts on this machine; 0: all training is offline.
 int ActorProcesses(const Config& config);

@@ -19,6 +19,10 @@ absl::StatusOr<Config> Identity(const Config& config) {
   *identity.mutable_env() = whole.env();
   *identity.mutable_network() = whole.network();
   *identity.mutable_algorithm() = whole.algorithm();
+  identity.mutable_algorithm()->clear_learning_rate();
+  identity.mutable_algorithm()->clear_learning_rate_decay_updates();
+  identity.mutable_algorithm()->clear_final_learning_rate();
+  identity.mutable_algorithm()->clear_threads();
   identity.mutable_replay()->set_capacity(whole.replay().capacity());
   *identity.mutable_replay()->mutable_seed() = whole.replay().seed();
   identity.mutable_replay()->mutable_seed()->clear_share();

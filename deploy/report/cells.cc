@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -119,9 +120,25 @@ class Gatherer {
       }
     }
     for (auto& [key, cell] : cells_) runs_->cells.push_back(std::move(cell));
+    NoteMixedConfigs();
   }
 
  private:
+  // Finished seeds of one column of a row whose settings are not the same, of which figures are made
+  // together.
+  void NoteMixedConfigs() {
+    std::map<std::pair<int, int>, std::set<std::string>> digests;
+    for (const Cell& cell : runs_->cells) {
+      if (cell.state == CellState::kDone) digests[{cell.task, cell.contender}].insert(cell.digest);
+    }
+    for (const auto& [pair, different] : digests) {
+      if (different.size() < 2) continue;
+      runs_->notes.push_back(absl::StrCat(
+          runs_->grid.task(pair.first).name(), "/", runs_->grid.contender(pair.second).name(), ": seeds of ",
+          different.size(), " configs are averaged; the cells' settings below say in what they differ"));
+    }
+  }
+
   // Negative indices: the grid does not know it. Folders of other things (logs, a report) lie there too.
   void VisitSeeds(const std::string& folder, int task, int contender) {
     if (task < 0 || contender < 0) {
@@ -179,7 +196,12 @@ absl::Status ReadGridOf(const std::string& run_dir, bool has_grid, Runs* runs) {
     AddMissing(grid, &runs->grid);
   }
   const absl::StatusOr<std::string> scale = ReadFile(absl::StrCat(run_dir, "/", kScaleFile));
-  if (scale.ok() && runs->scale.empty()) runs->scale = std::string(absl::StripAsciiWhitespace(*scale));
+  if (!scale.ok()) return absl::OkStatus();
+  const std::string name(absl::StripAsciiWhitespace(*scale));
+  if (runs->scale.empty()) runs->scale = name;
+  if (runs->scale != name)
+    runs->notes.push_back(
+        absl::StrCat(run_dir, ": of scale ", name, ", reported together with runs of scale ", runs->scale));
   return absl::OkStatus();
 }
 

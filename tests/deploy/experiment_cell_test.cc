@@ -60,7 +60,6 @@ class CellTest : public testing::Test {
 
 TEST_F(CellTest, WithoutAFolderIsNew) {
   EXPECT_EQ(State(), CellState::kNew);
-  EXPECT_FALSE(HasBegun(cell_));
 }
 
 TEST_F(CellTest, AtItsLimitWithFinalResultsIsDone) {

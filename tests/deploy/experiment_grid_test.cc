@@ -12,6 +12,7 @@
 #include "absl/strings/str_split.h"
 #include "core/file_io.h"
 #include "deploy/experiment_cell.h"
+#include "proto/config_file.h"
 #include "proto/experiment_file.h"
 #include "tests/temp_dir.h"
 
@@ -256,6 +257,32 @@ TEST_F(GridTest, RefusesAnAlgorithmThatDoesNotServeATasksActions) {
                         HasSubstr("discrete actions of environment 'connect4'"), HasSubstr("found sac"))));
 }
 
+TEST_F(GridTest, RefusesExplorationAndOpponentsThatDoNotFitTheTask) {
+  EXPECT_THAT(
+      ErrorsOf({{"env { name: \"connect4\" }", "env { name: \"connect4\" } actor { action_noise: 0.1 }"}}),
+      ElementsAre(AllOf(HasSubstr("task 'connect4', contender 'dbr': "),
+                        HasSubstr("actor.action_noise: expected 0"))));
+  EXPECT_THAT(
+      ErrorsOf({{"config { env { name: \"hopper\" } } }",
+                 "config { env { name: \"hopper\" } evaluation { final_opponents: \"random\" } } }"}}),
+      IsSupersetOf({AllOf(HasSubstr("task 'hopper', contender 'dbr': evaluation.final_opponents"),
+                          HasSubstr("has no opponents"))}));
+}
+
+TEST_F(GridTest, ARowOfTheReportIsOfWhatThereIs) {
+  const auto with_measure = [&](const std::string& measure) {
+    return ErrorsOf(
+        {{"name: \"connect4\" kind: GAMES", "name: \"connect4\" kind: GAMES measure { " + measure + " }"}});
+  };
+  EXPECT_THAT(with_measure("published { contender: \"dbrr\" mean: 1 }"),
+              ElementsAre("experiment 'tiny': task 'connect4': measure.published.contender: expected a "
+                          "contender's name, found 'dbrr'; did you mean 'dbr'?"));
+  EXPECT_THAT(
+      with_measure("opponent: \"mcts:11\""),
+      ElementsAre(AllOf(HasSubstr("measure.opponent: expected one of the final evaluation's (random, "),
+                        HasSubstr("found 'mcts:11'"))));
+}
+
 TEST_F(GridTest, RefusesAnUnknownEnvironment) {
   EXPECT_THAT(ErrorsOf({{"env { name: \"connect4\" }", "env { name: \"chess\" }"}}),
               ElementsAre(AllOf(HasSubstr("task 'connect4', contender 'dbr': "), HasSubstr("\"chess\""))));
@@ -302,6 +329,20 @@ TEST_F(GridTest, ACellThatHasBegunNeedsItsSeedBufferNoMore) {
   std::filesystem::create_directories(grid->cells[0].folder);
   Touch(grid->cells[0].folder + "/config.textproto");
   EXPECT_TRUE(MakeGrid(Changed({}), options).ok());
+}
+
+TEST_F(GridTest, ACellThatWasKilledBeforeItHadAStoreNeedsItsSeedBuffer) {
+  GridOptions options = Options();
+  options.only = {"hopper-medium/sac/seed-1"};
+  const auto grid = MakeGrid(Changed({}), options);
+  ASSERT_TRUE(grid.ok()) << grid.status();
+  std::filesystem::create_directories(grid->cells[0].folder);
+  ASSERT_TRUE(
+      WriteFileAtomically(grid->cells[0].folder + "/config.textproto", PrintConfig(grid->cells[0].config))
+          .ok());
+  std::filesystem::remove(folder_ / "hopper-medium.hdf5");
+  EXPECT_THAT(std::string(MakeGrid(Changed({}), options).status().message()),
+              HasSubstr("task 'hopper-medium': expected its seed buffer"));
 }
 
 TEST_F(GridTest, RefusesFoldersTooDeepForSockets) {

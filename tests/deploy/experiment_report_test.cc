@@ -141,6 +141,21 @@ TEST_F(ReportTest, ACellThatTwoFoldersHoldCountsOnce) {
   for (const Cell& cell : runs->cells) EXPECT_EQ(cell.state, CellState::kDone);
 }
 
+TEST_F(ReportTest, SaysWhereSeedsOfSeveralConfigsOrScalesAreTakenTogether) {
+  WriteFakeRuns(folder_ / "runs");
+  ASSERT_TRUE(WriteFileAtomically(folder_ / "runs/hopper-medium/dbr/seed-2/config.textproto",
+                                  "learner { max_updates: 7 }")
+                  .ok());
+  WriteFakeExperiment(folder_ / "more");
+  ASSERT_TRUE(WriteFileAtomically(folder_ / "more/scale.txt", "paper\n").ok());
+  const auto runs = LoadRuns({folder_ / "runs", folder_ / "more"}, "");
+  ASSERT_TRUE(runs.ok()) << runs.status();
+  EXPECT_EQ(runs->scale, "short");
+  EXPECT_THAT(runs->notes,
+              ElementsAre(AllOf(HasSubstr("/more: of scale paper"), HasSubstr("runs of scale short")),
+                          HasSubstr("hopper-medium/dbr: seeds of 2 configs are averaged")));
+}
+
 TEST_F(ReportTest, SaysWhichFoldersTheGridDoesNotKnow) {
   WriteFakeExperiment(folder_ / "runs");
   WriteFakeCell(folder_ / "runs", "swimmer", "dbr", FakeHopper(1, 1));

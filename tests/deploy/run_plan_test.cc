@@ -35,6 +35,9 @@ class RunPlanTest : public testing::Test {
     return {.config = config_, .overrides = std::move(overrides), .run_dir = run_, .resume = resume};
   }
 
+  // As if the replay server had been there.
+  void MakeStore() { ASSERT_TRUE(WriteFileAtomically(RunFolder{run_}.replay_store(), "rows").ok()); }
+
   TempDir folder_;
   const std::string config_ = folder_ / "config.textproto";
   const std::string run_ = folder_ / "run";
@@ -92,8 +95,22 @@ TEST_F(RunPlanTest, ResumesWithTheFoldersOwnConfig) {
   EXPECT_EQ(plan->config.launch().max_seconds(), 7);
 }
 
+// The way out that a loss that is not finite is answered with.
+TEST_F(RunPlanTest, ResumesUnderAnotherLearningRate) {
+  ASSERT_TRUE(PrepareRun(Options(), kNow).ok());
+  MakeStore();
+  const auto plan =
+      PrepareRun(Options({"algorithm.learning_rate=1e-4", "algorithm.learning_rate_decay_updates=1000",
+                          "algorithm.final_learning_rate=1e-5", "algorithm.threads=1"},
+                         true),
+                 kNow);
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  EXPECT_EQ(LoadConfig(plan->folder.config())->algorithm().learning_rate(), 1e-4);
+}
+
 TEST_F(RunPlanTest, RefusesToResumeAnotherRunAndNamesTheFields) {
   ASSERT_TRUE(PrepareRun(Options(), kNow).ok());
+  MakeStore();
   const std::string before = *ReadFile(RunFolder{run_}.config());
   const auto plan = PrepareRun(Options({"replay.capacity=6000", "network.hidden_sizes=[64, 64]",
                                         "algorithm.dbr.epsilon=0.1", "seed=5"},
@@ -104,6 +121,20 @@ TEST_F(RunPlanTest, RefusesToResumeAnotherRunAndNamesTheFields) {
               AllOf(HasSubstr("replay.capacity: 5000 -> 6000"), HasSubstr("hidden_sizes"),
                     HasSubstr("epsilon"), Not(HasSubstr("seed"))));
   EXPECT_EQ(*ReadFile(RunFolder{run_}.config()), before);
+}
+
+// It failed at its start, of its config perhaps.
+TEST_F(RunPlanTest, ResumesARunThatNeverBeganAsANewOne) {
+  ASSERT_TRUE(PrepareRun(Options(), kNow).ok());
+  auto plan = PrepareRun(Options({"replay.capacity=6000"}, true), kNow);
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  EXPECT_FALSE(plan->resume);
+  EXPECT_EQ(LoadConfig(plan->folder.config())->replay().capacity(), 6000);
+  plan->lock.reset();
+  MakeStore();
+  plan = PrepareRun(Options({"replay.capacity=6000"}, true), kNow);
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  EXPECT_TRUE(plan->resume);
 }
 
 TEST_F(RunPlanTest, RefusesToResumeWhatIsNoRunFolder) {
@@ -165,6 +196,35 @@ TEST_F(RunPlanTest, RefusesNoiseOnDiscreteActionsBeforeItMakesAFolder) {
   EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(plan.status().message()), HasSubstr("actor.action_noise: expected 0"));
   EXPECT_FALSE(std::filesystem::exists(run_));
+}
+
+TEST_F(RunPlanTest, RefusesOpponentsThatThereAreNotBeforeItMakesAFolder) {
+  for (const char* field : {"evaluation.opponents", "evaluation.final_opponents"}) {
+    const auto plan = PrepareRun(Options({absl::StrCat(field, "=['random', 'mcts:1O']")}), kNow);
+    EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_THAT(std::string(plan.status().message()),
+                AllOf(HasSubstr(absl::StrCat(field, ": ")), HasSubstr("unknown opponent \"mcts:1O\"")));
+  }
+  const auto plan = PrepareRun(Options({"env.name=hopper", "evaluation.final_opponents=['random']"}), kNow);
+  EXPECT_THAT(std::string(plan.status().message()),
+              HasSubstr("evaluation.final_opponents: environment hopper has no opponents"));
+  EXPECT_FALSE(std::filesystem::exists(run_));
+}
+
+TEST_F(RunPlanTest, RefusesHowNobodyCouldChooseBeforeItMakesAFolder) {
+  const auto error_of = [&](std::vector<std::string> overrides) {
+    return std::string(PrepareRun(Options(std::move(overrides)), kNow).status().message());
+  };
+  EXPECT_THAT(error_of({"env.name=hopper", "actor.mode=SUPPORT"}),
+              AllOf(HasSubstr("actor.mode: expected SAMPLE, MODE or GREEDY_Q"), HasSubstr("dbr on hopper")));
+  EXPECT_THAT(error_of({"evaluation.final_episodes=2000000"}),
+              HasSubstr("evaluation.final_episodes: expected 1 to 1048576, found 2000000"));
+  ASSERT_TRUE(WriteFileAtomically(config_, "env { name: 'connect4' } algorithm { bear {} }").ok());
+  EXPECT_THAT(error_of({"evaluation.mode=SUPPORT"}),
+              AllOf(HasSubstr("evaluation.mode: expected"), HasSubstr("bear on connect4")));
+  EXPECT_FALSE(std::filesystem::exists(run_));
+  ASSERT_TRUE(WriteFileAtomically(config_, "env { name: 'connect4' } algorithm { dbr {} }").ok());
+  EXPECT_TRUE(PrepareRun(Options({"evaluation.mode=SUPPORT"}), kNow).ok());
 }
 
 TEST_F(RunPlanTest, RefusesAnAlgorithmThatDoesNotServeTheActionsBeforeItMakesAFolder) {
