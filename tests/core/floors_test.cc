@@ -35,7 +35,7 @@ const std::vector<Room>& Rooms() {
       {"replay service",
        2,
        {"replay/service", "replay/replay_server", "replay/seed_import", "replay/client", "replay/writer",
-        "replay/outbox"}},
+        "replay/outbox", "replay/await_stats"}},
       {"actor", 3, {"actor/"}},
       {"learner runtime", 3, {"learner/"}},
       {"deploy", 4, {"deploy/"}},

@@ -122,7 +122,8 @@ TEST_F(SeedPlanTest, ABadSeedIsRefusedBeforeAFolderIsMade) {
 
 TEST_F(SeedPlanTest, AResumedRunKeepsItsSeed) {
   ASSERT_TRUE(PrepareRun(Options(seed_), kNow).ok());
-  std::filesystem::remove(seed_);  // it lies in the replay's store by now
+  ASSERT_TRUE(WriteFileAtomically(RunFolder{run_}.replay_store(), "its rows").ok());
+  std::filesystem::remove(seed_);  // it lies in the store by now
   LaunchOptions resume{.run_dir = run_, .resume = true};
   EXPECT_TRUE(PrepareRun(resume, kNow).ok());
   resume.seed_buffer = folder_ / "other.hdf5";
