@@ -1,12 +1,13 @@
 // The two programs of this room without their flags: the actor and the evaluator.
 #pragma once
 
-#include <atomic>
 #include <memory>
 #include <string>
 
+#include "absl/base/call_once.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "absl/synchronization/notification.h"
 #include "absl/time/time.h"
 #include "actor/evaluation_loop.h"
 #include "actor/policy_subscriber.h"
@@ -58,7 +59,8 @@ class Actor {
   std::unique_ptr<VectorEnv> envs_;  // until the step loop takes them
   std::unique_ptr<PolicySubscriber> subscriber_;
   std::unique_ptr<TransitionWriter> writer_;
-  std::atomic<bool> stopping_ = false;
+  absl::once_flag stop_once_;
+  absl::Notification stopping_;
 };
 
 // Evaluates the newest policy now and then and reports to the learner.

@@ -19,10 +19,6 @@ namespace {
 // A stream that lives longer is opened again without a word, so that none can hang for ever.
 constexpr absl::Duration kStreamLifetime = absl::Minutes(10);
 
-bool IsFinal(const absl::Status& status) {
-  return absl::IsInvalidArgument(status) || absl::IsUnimplemented(status);
-}
-
 }  // namespace
 
 PolicySpec ExpectedPolicy(const EnvSpec& env, const Config& config) {

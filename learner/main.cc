@@ -3,11 +3,11 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <filesystem>
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "absl/synchronization/notification.h"
 #include "absl/time/clock.h"
 #include "core/run_folder.h"
 #include "core/shutdown.h"
@@ -69,13 +69,13 @@ absl::Status Resume(const RunFolder& folder, const LearnerConfig& config, Traine
 // Labels that the replay has may be newer than what `trainer` goes on from, and it refuses older ones: no
 // training before it has told of them. Blocks until then, or until a signal has stopped the trainer.
 absl::Status ContinueVersions(ReplayClient* replay, Trainer* trainer) {
-  std::atomic<bool> stopping = false;
+  absl::Notification stopping;
   const ShutdownWatcher watcher([&] {
-    stopping = true;
+    if (!stopping.HasBeenNotified()) stopping.Notify();
     trainer->Stop();
   });
   const absl::StatusOr<StatsReply> stats = AwaitStats(replay, "to hear of its newest labels", stopping);
-  if (stopping) return absl::OkStatus();
+  if (stopping.HasBeenNotified()) return absl::OkStatus();
   RETURN_IF_ERROR(stats.status());
   trainer->StartVersionsAfter(stats->newest_critic_version());
   return absl::OkStatus();

@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "absl/time/clock.h"
 #include "absl/time/time.h"
+#include "proto/grpc_status.h"
 
 namespace dbr {
 namespace {
@@ -15,16 +15,14 @@ constexpr absl::Duration kAskEvery = absl::Seconds(1);
 }  // namespace
 
 absl::StatusOr<StatsReply> AwaitStats(ReplayClient* client, absl::string_view purpose,
-                                      const std::atomic<bool>& stopping) {
-  for (bool first = true; !stopping; first = false) {
-    const absl::Time asked = absl::Now();
+                                      const absl::Notification& stopping) {
+  for (bool first = true; !stopping.HasBeenNotified(); first = false) {
     absl::StatusOr<StatsReply> stats = client->Stats(kAskEvery);
-    const bool will_answer = absl::IsUnavailable(stats.status()) || absl::IsDeadlineExceeded(stats.status());
-    if (stats.ok() || !will_answer) return stats;
+    if (stats.ok() || IsFinal(stats.status())) return stats;
     if (first)
       spdlog::info("waiting for the replay server, {}: {}", std::string(purpose),
                    std::string(stats.status().message()));
-    absl::SleepFor(asked + kAskEvery - absl::Now());
+    stopping.WaitForNotificationWithTimeout(kAskEvery);
   }
   return absl::CancelledError("stopped while the replay server did not answer");
 }

@@ -48,13 +48,6 @@ absl::Status CheckWidths(const TransitionLayout& layout, const TransitionView& t
   return CheckWidth("next_mask", layout.mask_width, transition.next_mask.size());
 }
 
-// Errors that another try cannot mend.
-bool IsFinal(const absl::Status& status) {
-  return status.code() == absl::StatusCode::kInvalidArgument ||
-         status.code() == absl::StatusCode::kUnimplemented ||
-         status.code() == absl::StatusCode::kPermissionDenied;
-}
-
 }  // namespace
 
 // One thread connects and sends; while a stream lives a second one reads replies.

@@ -10,6 +10,8 @@
 #include "proto/channel.h"
 #include "proto/codec.h"
 #include "proto/grpc_status.h"
+#include "proto/server.h"
+#include "replay/await_stats.h"
 #include "replay/client.h"
 #include "replay/replay_server.h"
 #include "replay/writer.h"
@@ -295,6 +297,30 @@ TEST_F(ReplayOverSocket, StatsTellWhoIsBlockedAndWhy) {
   DrawnBatches drawn;
   EXPECT_EQ(client.Sample({.uniform = 8}, kSmallLayout, kPatience, &drawn).code(),
             absl::StatusCode::kCancelled);
+}
+
+TEST_F(ReplayOverSocket, StatisticsAreAwaitedUntilThereIsAServer) {
+  const absl::Notification never;
+  std::thread process([&] {
+    ReplayClient client(options_.server.address);
+    const auto stats = AwaitStats(&client, "for this test", never);
+    EXPECT_TRUE(stats.ok() && stats->capacity() == 10000) << stats.status();
+  });
+  StartServer();
+  process.join();
+}
+
+TEST_F(ReplayOverSocket, AwaitingStatisticsEndsWithTheProcessAndBeforeAnotherProgram) {
+  ReplayClient client(options_.server.address);
+  absl::Notification stopping;
+  std::thread process(
+      [&] { EXPECT_TRUE(absl::IsCancelled(AwaitStats(&client, "for this test", stopping).status())); });
+  stopping.Notify();
+  process.join();
+  const auto another = dbr::StartServer(options_.server, {});
+  ASSERT_TRUE(another.ok()) << another.status();
+  const absl::Notification never;
+  EXPECT_TRUE(absl::IsUnimplemented(AwaitStats(&client, "for this test", never).status()));
 }
 
 TEST_F(ReplayOverSocket, StoppingAnswersADrawThatWaits) {
