@@ -13,10 +13,10 @@
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
 #include "core/status_macros.h"
-#include "deploy/experiment_grid.h"
+#include "deploy/experiment/grid.h"
+#include "deploy/launch/summary_reader.h"
 #include "deploy/report/grid.h"
 #include "deploy/report/settings.h"
-#include "deploy/summary_reader.h"
 #include "proto/experiment_file.h"
 
 namespace dbr::report {

@@ -6,7 +6,7 @@
 #include <iterator>
 #include <map>
 
-#include "deploy/statistics.h"
+#include "deploy/report/statistics.h"
 
 namespace dbr::report {
 namespace {

@@ -6,7 +6,7 @@
 #include "absl/time/time.h"
 #include "core/file_io.h"
 #include "core/status_macros.h"
-#include "deploy/gnuplot.h"
+#include "deploy/process/gnuplot.h"
 
 namespace dbr::report {
 namespace {

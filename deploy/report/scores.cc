@@ -9,7 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "deploy/report/grid.h"
-#include "deploy/terminal.h"
+#include "deploy/terminal/terminal.h"
 
 namespace dbr::report {
 namespace {

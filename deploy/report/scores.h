@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "deploy/report/cells.h"
-#include "deploy/statistics.h"
+#include "deploy/report/statistics.h"
 
 namespace dbr::report {
 

@@ -10,7 +10,7 @@
 #include "absl/strings/str_join.h"
 #include "absl/time/time.h"
 #include "deploy/report/grid.h"
-#include "deploy/terminal.h"
+#include "deploy/terminal/terminal.h"
 
 namespace dbr::report {
 namespace {

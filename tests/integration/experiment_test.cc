@@ -11,7 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "core/file_io.h"
-#include "deploy/commit.h"
+#include "deploy/launch/commit.h"
 #include "tests/integration/dbr_process.h"
 #include "tests/integration/run_files.h"
 #include "tests/temp_dir.h"

@@ -1,0 +1,209 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "core/status_macros.h"
+#include "deploy/cli/command_line.h"
+#include "deploy/cli/dataset_command.h"
+#include "deploy/cli/shipped_file.h"
+#include "deploy/record/recorder.h"
+#include "deploy/record/store_episodes.h"
+#include "deploy/terminal/progress_bar.h"
+#include "deploy/terminal/terminal.h"
+#include "envs/env.h"
+#include "replay/dataset/dataset_writer.h"
+
+namespace dbr {
+namespace {
+
+constexpr absl::Duration kProgressEvery = absl::Seconds(10);
+constexpr std::int64_t kMaxSteps = 1'000'000'000;
+
+struct RecordFlags {
+  std::string env;
+  std::string quality;
+  std::int64_t steps = 0;  // 0: not given
+  std::string out;
+  std::uint64_t seed = 1;
+  std::string layout = "d4rl";
+  std::string policy;
+  std::string run;
+};
+
+absl::Status CheckFlags(const RecordFlags& flags, const EnvSpec& env) {
+  const bool mixed = flags.quality == "mixed", medium = flags.quality == "medium";
+  const auto refuse = [](absl::string_view message) { return absl::InvalidArgumentError(message); };
+  if (!mixed && !medium && flags.quality != "random") {
+    return refuse(absl::StrCat("--quality: expected random, medium or mixed, found '", flags.quality, "'"));
+  }
+  if (!mixed && flags.steps == 0)
+    return refuse(
+        absl::StrCat("--steps: expected a number of steps to record with --quality ", flags.quality));
+  if (!medium && !flags.policy.empty()) {
+    return refuse(absl::StrCat("--policy: expected with --quality medium alone, found with ", flags.quality));
+  }
+  if (!mixed && !flags.run.empty()) {
+    return refuse(absl::StrCat("--run: expected with --quality mixed alone, found with ", flags.quality));
+  }
+  if (mixed && flags.run.empty()) {
+    return refuse(absl::StrCat(
+        "--quality mixed is all that a training run saw: name the run's folder with --run. Such ",
+        "a run is made by: dbr launch deploy/configs/", env.name, "_medium.textproto"));
+  }
+  return absl::OkStatus();
+}
+
+std::unique_ptr<ProgressBar> MakeBar(const RecordFlags& flags, const EnvSpec& env, std::int64_t steps) {
+  BarState state;
+  state.label = absl::StrCat(env.name, " ", flags.quality);
+  state.unit = "steps";
+  state.total = steps;
+  return std::make_unique<ProgressBar>(stderr, state, absl::Now(), kProgressEvery);
+}
+
+absl::StatusOr<std::shared_ptr<const PolicyNetworks>> MediumPolicy(const RecordFlags& flags,
+                                                                   const EnvSpec& env) {
+  if (!flags.policy.empty()) return OpenPolicy(flags.policy);
+  const absl::StatusOr<std::string> path =
+      FindShippedFile(absl::StrCat("deploy/policies/", env.name, "_medium.safetensors"));
+  if (path.ok()) return OpenPolicy(*path);
+  return absl::NotFoundError(absl::StrCat(path.status().message(),
+                                          "; name a policy with --policy, or train one: dbr ",
+                                          "launch deploy/configs/", env.name, "_medium.textproto"));
+}
+
+absl::Status RecordPlay(const RecordFlags& flags, const EnvSpec& env, DatasetWriter* writer,
+                        const Interrupt& interrupt) {
+  RecordOptions options;
+  options.env = env.name;
+  options.steps = flags.steps;
+  options.seed = flags.seed;
+  if (flags.quality == "medium") {
+    ASSIGN_OR_RETURN(options.policy, MediumPolicy(flags, env));
+  }
+  const std::unique_ptr<ProgressBar> bar = MakeBar(flags, env, flags.steps);
+  const RecordSinks sinks = {.episode = [&](const EpisodeView& episode) { return writer->Append(episode); },
+                             .progress = [&](std::int64_t steps) { bar->Update(steps, absl::Now()); }};
+  return RecordEpisodes(options, sinks, interrupt.flag());
+}
+
+absl::Status RecordRun(const RecordFlags& flags, const RunStore& run, DatasetWriter* writer,
+                       const Interrupt& interrupt) {
+  const std::vector<StoreEpisode> episodes = LinkEpisodes(*run.store, run.env.max_episode_steps);
+  std::int64_t held = 0;
+  for (const StoreEpisode& episode : episodes) held += static_cast<std::int64_t>(episode.slots.size());
+  if (flags.steps > held || held == 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--steps: expected at most what the run's store holds of its own, ", held,
+                     " transitions, found ", flags.steps));
+  }
+  std::int64_t left = flags.steps > 0 ? flags.steps : held;
+  const std::unique_ptr<ProgressBar> bar = MakeBar(flags, run.env, left);
+  std::int64_t written = 0;
+  for (const StoreEpisode& episode : episodes) {
+    if (interrupt.flag()) return absl::CancelledError("the recording was stopped");
+    const std::size_t steps = std::min<std::size_t>(left, episode.slots.size());
+    if (steps == 0) break;
+    RETURN_IF_ERROR(writer->Append(CopyEpisode(*run.store, episode, steps).View()));
+    left -= static_cast<std::int64_t>(steps);
+    bar->Update(written += static_cast<std::int64_t>(steps), absl::Now());
+  }
+  const std::uint64_t evicted = run.store->inserted() - run.store->size();
+  if (evicted > 0) {
+    std::fprintf(stderr,
+                 "dbr dataset record: the run's oldest %s transitions were evicted and are missing; a run "
+                 "with a larger "
+                 "replay.capacity keeps all\n",
+                 WithCommas(evicted).c_str());
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<RunStore> OpenRunOf(const RecordFlags& flags, const EnvSpec& env) {
+  ASSIGN_OR_RETURN(RunStore run, OpenRunStore(flags.run));
+  if (run.env.name == env.name) return run;
+  return absl::InvalidArgumentError(absl::StrCat("--run: expected a run of ", env.name, ", found one of ",
+                                                 run.env.name,
+                                                 "; name that environment with --env, or another run"));
+}
+
+absl::Status Record(const RecordFlags& flags, const Interrupt& interrupt) {
+  ASSIGN_OR_RETURN(const std::optional<DatasetLayout> layout, ParseLayoutOption("--layout", flags.layout));
+  ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv({.name = flags.env, .opponents = {}}));
+  RETURN_IF_ERROR(CheckFlags(flags, env->spec()));
+  const DatasetWriterOptions options{.layout = layout.value_or(DatasetLayout::kD4rl), .env = env->spec()};
+  if (flags.run.empty()) {
+    ASSIGN_OR_RETURN(const std::unique_ptr<DatasetWriter> writer, DatasetWriter::Create(flags.out, options));
+    RETURN_IF_ERROR(RecordPlay(flags, env->spec(), writer.get(), interrupt));
+    return writer->Finish();
+  }
+  ASSIGN_OR_RETURN(const RunStore run, OpenRunOf(flags, env->spec()));
+  ASSIGN_OR_RETURN(const std::unique_ptr<DatasetWriter> writer, DatasetWriter::Create(flags.out, options));
+  RETURN_IF_ERROR(RecordRun(flags, run, writer.get(), interrupt));
+  return writer->Finish();
+}
+
+absl::StatusOr<int> RunRecord(const RecordFlags& flags) {
+  const Interrupt interrupt;
+  const absl::Time start = absl::Now();
+  const absl::Status recorded = Record(flags, interrupt);
+  if (absl::IsCancelled(recorded)) return kInterruptedExit;
+  RETURN_IF_ERROR(recorded);
+  const double seconds = absl::ToDoubleSeconds(absl::Now() - start);
+  ASSIGN_OR_RETURN(const DatasetReport report, ReportDataset(flags.out, std::nullopt, interrupt));
+  std::printf("%s  %s in %s s, %s steps/s\n", DatasetText(report).c_str(), PadRight("recorded", 12).c_str(),
+              Fixed(seconds, 1).c_str(),
+              Compact(static_cast<double>(report.facts.transitions) / seconds).c_str());
+  return 0;
+}
+
+}  // namespace
+
+void AddDatasetRecord(CLI::App* dataset, int* exit_code) {
+  auto flags = std::make_shared<RecordFlags>();
+  CLI::App* command = dataset->add_subcommand("record", "Record a robot's steps on every core");
+  command->add_option("--env", flags->env, "hopper, walker2d, half_cheetah or ant")
+      ->required()
+      ->type_name("NAME");
+  command
+      ->add_option(
+          "--quality", flags->quality,
+          "random: uniform actions; medium: a trained policy's mean action; mixed: all that a run saw")
+      ->required()
+      ->type_name("random|medium|mixed");
+  command
+      ->add_option("--steps", flags->steps, "Transitions to record [mixed: all that the run's store holds]")
+      ->check(CLI::Range(std::int64_t{1}, kMaxSteps))
+      ->type_name("N");
+  command->add_option("--out", flags->out, "The HDF5 file to write; replaced when the new one is whole")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("--seed", flags->seed, "The same seed records the same steps, on any number of cores")
+      ->capture_default_str()
+      ->type_name("N");
+  command->add_option("--layout", flags->layout, "d4rl or d4rl_pybullet")
+      ->capture_default_str()
+      ->type_name("NAME");
+  command
+      ->add_option("--policy", flags->policy,
+                   "medium: a policy file or a run folder [deploy/policies/ENV_medium.safetensors]")
+      ->type_name("FILE_OR_RUN");
+  command->add_option("--run", flags->run, "mixed: the folder of the training run")->type_name("DIR");
+  command->footer(
+      "Examples:\n"
+      "  dbr dataset record --env hopper --quality medium --steps 1000000 --out hopper_medium.hdf5\n"
+      "  dbr dataset record --env hopper --quality mixed --run runs/hopper --out hopper_mixed.hdf5");
+  command->callback([flags, exit_code] {
+    const absl::StatusOr<int> result = RunRecord(*flags);
+    *exit_code = result.ok() ? *result : Fail("dataset record", result.status());
+  });
+}
+
+}  // namespace dbr

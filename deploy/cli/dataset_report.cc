@@ -1,0 +1,50 @@
+#include "deploy/cli/dataset_report.h"
+
+#include <nlohmann/json.hpp>
+
+#include "absl/strings/str_cat.h"
+#include "deploy/terminal/terminal.h"
+
+namespace dbr {
+namespace {
+
+constexpr int kNameWidth = 13;
+
+std::string Line(absl::string_view name, absl::string_view value) {
+  return absl::StrCat("  ", PadRight(name, kNameWidth), value, "\n");
+}
+
+}  // namespace
+
+std::string DatasetText(const DatasetReport& report) {
+  const DatasetFacts& facts = report.facts;
+  std::string text = absl::StrCat(report.path, "\n", Line("layout", DatasetLayoutName(report.layout)));
+  if (!report.env.empty()) absl::StrAppend(&text, Line("environment", report.env));
+  absl::StrAppend(
+      &text, Line("rows", WithCommas(facts.rows)), Line("transitions", WithCommas(facts.transitions)),
+      Line("episodes",
+           absl::StrCat(WithCommas(facts.episodes), " (", WithCommas(facts.terminals),
+                        " ended by a terminal, ", WithCommas(facts.timeouts), " by the time limit)")),
+      Line("return", absl::StrCat(Fixed(facts.return_mean, 1), " ± ", Fixed(facts.return_std, 1), " (from ",
+                                  Fixed(facts.return_min, 1), " to ", Fixed(facts.return_max, 1), ")")),
+      Line("not finite", absl::StrCat(WithCommas(facts.non_finite), " rows")));
+  return text;
+}
+
+nlohmann::ordered_json DatasetJson(const DatasetReport& report) {
+  const DatasetFacts& facts = report.facts;
+  return {{"layout", DatasetLayoutName(report.layout)},
+          {"rows", facts.rows},
+          {"transitions", facts.transitions},
+          {"episodes", facts.episodes},
+          {"terminals", facts.terminals},
+          {"timeouts", facts.timeouts},
+          {"non_finite", facts.non_finite},
+          {"return",
+           {{"mean", facts.return_mean},
+            {"std", facts.return_std},
+            {"min", facts.return_min},
+            {"max", facts.return_max}}}};
+}
+
+}  // namespace dbr

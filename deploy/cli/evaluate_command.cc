@@ -1,0 +1,138 @@
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "actor/evaluation_loop.h"
+#include "actor/evaluator.h"
+#include "core/rng.h"
+#include "core/status_macros.h"
+#include "deploy/cli/command_line.h"
+#include "deploy/film/film.h"
+#include "deploy/launch/result_tables.h"
+#include "deploy/launch/results.h"
+#include "deploy/process/interrupt.h"
+#include "deploy/terminal/terminal.h"
+#include "envs/env.h"
+#include "nn/policy.h"
+
+namespace dbr {
+namespace {
+
+struct EvaluateFlags {
+  std::string policy;
+  std::string opponent;
+  int episodes = 1000;
+  std::uint64_t seed = 1;
+  std::string mode = "mode";
+  bool json = false;
+  std::string film;
+};
+
+// Films the first episode of the evaluation with that seed.
+absl::StatusOr<int> RunFilm(const EvaluateFlags& flags, const PolicyNetworks& policy, ActingMode mode) {
+  ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv({.name = policy.spec().env, .opponents = {}}));
+  PolicySpec expected = policy.spec();
+  expected.env = env->spec().name;
+  expected.observation_size = env->spec().observation_size;
+  expected.actions = env->spec().actions;
+  RETURN_IF_ERROR(CheckSameSpec(expected, policy.spec()));
+  const auto column = [](auto span) {
+    return Eigen::Map<const MatrixX<float>>(span.data(), static_cast<Eigen::Index>(span.size()), 1);
+  };
+  PolicyRunner runner;
+  Rng rng(flags.seed);
+  const ChooseAction choose = [&](absl::Span<const float> observation, absl::Span<const float> mask,
+                                  absl::Span<float> action) {
+    Eigen::Map<MatrixX<float>> actions(action.data(), static_cast<Eigen::Index>(action.size()), 1);
+    return runner.Act(policy, mode, column(observation), column(mask), rng, actions);
+  };
+  const Interrupt interrupt;
+  const absl::StatusOr<FilmSummary> film =
+      FilmEpisode(*env, choose, {.path = flags.film, .seed = flags.seed * kMaxEpisodes}, &interrupt.flag());
+  if (absl::IsCancelled(film.status())) return kInterruptedExit;
+  RETURN_IF_ERROR(film.status());
+  std::printf("%s: %s steps on %s with a return of %.1f, %s frames, %s kB\n", flags.film.c_str(),
+              WithCommas(film->steps).c_str(), env->spec().name.c_str(), film->episode_return,
+              WithCommas(film->frames).c_str(), WithCommas((film->bytes + 999) / 1000).c_str());
+  return 0;
+}
+
+absl::StatusOr<int> RunEvaluate(const EvaluateFlags& flags) {
+  ASSIGN_OR_RETURN(const ActingMode mode, ParseActingMode(flags.mode));
+  ASSIGN_OR_RETURN(const std::shared_ptr<const PolicyNetworks> policy, OpenPolicy(flags.policy));
+  if (!flags.film.empty()) return RunFilm(flags, *policy, mode);
+  std::vector<std::string> opponents = {flags.opponent};
+  if (flags.opponent.empty()) opponents = OpponentsToEvaluate(policy->spec().env, {});
+  if (flags.json) opponents.resize(1);
+  const Interrupt interrupt;
+  std::vector<EvaluationResult> results;
+  for (const std::string& opponent : opponents) {
+    const EvaluationOptions options{
+        .opponent = opponent, .episodes = flags.episodes, .seed = flags.seed, .mode = mode};
+    absl::StatusOr<EvaluationResult> result = Evaluate(*policy, options, &interrupt.flag());
+    if (absl::IsCancelled(result.status())) return kInterruptedExit;
+    RETURN_IF_ERROR(result.status());
+    results.push_back(*std::move(result));
+  }
+  if (flags.json) {
+    std::printf("%s\n", ToJson(results[0]).dump().c_str());
+    return 0;
+  }
+  const PolicySnapshot& snapshot = policy->snapshot();
+  std::printf("%s: %s on %s, policy %s after %s updates; seed %s, acting mode %s\n%s", flags.policy.c_str(),
+              snapshot.spec.algorithm.c_str(), snapshot.spec.env.c_str(),
+              WithCommas(snapshot.version).c_str(), WithCommas(snapshot.updates).c_str(),
+              absl::StrCat(flags.seed).c_str(), flags.mode.c_str(), ResultTable(results).c_str());
+  return 0;
+}
+
+}  // namespace
+
+void AddEvaluate(CLI::App* app, int* exit_code) {
+  auto flags = std::make_shared<EvaluateFlags>();
+  CLI::App* command =
+      app->add_subcommand("evaluate", "Play games with a policy and give its score with the standard error");
+  command->add_option("--policy", flags->policy, "A policy file, or a run folder for its newest one")
+      ->required()
+      ->type_name("FILE_OR_RUN");
+  command
+      ->add_option("--opponent", flags->opponent,
+                   "random, one_ply or mcts:N [all that the environment has; with --json the first of them]")
+      ->type_name("NAME");
+  command
+      ->add_option("--episodes", flags->episodes, "Games against each opponent, every second one begun by it")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1 << 20));
+  command->add_option("--seed", flags->seed, "The same seed plays the same games")
+      ->capture_default_str()
+      ->type_name("N");
+  command->add_option("--mode", flags->mode, "How the policy acts: sample, mode, greedy_q or support")
+      ->capture_default_str()
+      ->type_name("MODE");
+  command->add_flag("--json", flags->json,
+                    "Print one JSON object: {env, opponent, episodes, seed, score, return}");
+  command
+      ->add_option("--film", flags->film,
+                   "Instead of playing many episodes, draw the first into this animated WebP file")
+      ->type_name("FILE")
+      ->excludes("--json");
+  command->footer(
+      "Examples:\n"
+      "  dbr evaluate --policy runs/quickstart\n"
+      "  dbr evaluate --policy runs/quickstart/policy/latest.safetensors --opponent mcts:10 --episodes 2000 "
+      "--json\n"
+      "  dbr evaluate --policy runs/hopper --film hopper.webp");
+  command->callback([flags, exit_code] {
+    const absl::StatusOr<int> result = RunEvaluate(*flags);
+    *exit_code = result.ok() ? *result : Fail("evaluate", result.status());
+  });
+}
+
+}  // namespace dbr

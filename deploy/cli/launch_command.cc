@@ -1,0 +1,79 @@
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "core/status_macros.h"
+#include "deploy/cli/command_line.h"
+#include "deploy/launch/launch.h"
+#include "deploy/launch/run_plan.h"
+
+namespace dbr {
+namespace {
+
+struct LaunchFlags {
+  LaunchOptions options;
+  std::optional<std::uint64_t> seed;
+};
+
+absl::StatusOr<int> RunLaunch(const LaunchFlags& flags) {
+  LaunchOptions options = flags.options;
+  if (flags.seed.has_value()) options.overrides.push_back(absl::StrCat("seed=", *flags.seed));
+  ASSIGN_OR_RETURN(const std::string programs, ProgramsFolder());
+  ASSIGN_OR_RETURN(RunPlan plan, PrepareRun(options, absl::Now()));
+  ASSIGN_OR_RETURN(const std::unique_ptr<Launch> launch, Launch::Create(std::move(plan), programs, stdout));
+  return launch->Run();
+}
+
+}  // namespace
+
+void AddLaunch(CLI::App* app, int* exit_code) {
+  auto flags = std::make_shared<LaunchFlags>();
+  CLI::App* command = app->add_subcommand(
+      "launch", "Train: start replay, learner, actors and evaluator, and watch over them");
+  command->add_option("CONFIG", flags->options.config,
+                      "Config file; with --resume the run folder's own by default");
+  command
+      ->add_option("--set", flags->options.overrides,
+                   "Override a field of the config: path=value; may be repeated")
+      ->type_name("PATH=VALUE")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command->add_option("--seed", flags->seed, "Short for --set seed=N")->type_name("N");
+  command->add_option("--run-dir", flags->options.run_dir, "Folder of the run [runs/ENV-ALGORITHM-DATE-TIME]")
+      ->type_name("DIR");
+  command->add_flag("--resume", flags->options.resume, "Continue the run in --run-dir");
+  command
+      ->add_option("--seed-buffer", flags->options.seed_buffer,
+                   "HDF5 file of offline data that the replay server begins with (replay.seed.path)")
+      ->type_name("FILE");
+  command
+      ->add_option("--seed-layout", flags->options.seed_layout,
+                   "Its layout where the file does not say it: d4rl, d4rl_pybullet or minari")
+      ->type_name("NAME");
+  command->add_flag("--skip-bad-rows", flags->options.skip_bad_rows,
+                    "Leave out its rows with values that are not finite");
+  command->footer(
+      "Ends at launch.max_seconds, max_episodes, max_steps or stop_at_return or learner.max_updates of the "
+      "config, or on\n"
+      "Ctrl-C; everything is saved first. A second Ctrl-C kills the process that is being waited for.\n"
+      "Exit status: 0 after a limit, 130 after Ctrl-C or SIGTERM, 2 for a bad config or flag, 1 for other "
+      "failures.\n\n"
+      "Examples:\n"
+      "  dbr launch deploy/configs/connect4.textproto\n"
+      "  dbr launch deploy/configs/connect4.textproto --set launch.max_seconds=60 --set "
+      "algorithm.dbr.epsilon=0.1 --seed 2\n"
+      "  dbr launch deploy/configs/hopper_finetune.textproto --seed-buffer hopper-medium.hdf5\n"
+      "  dbr launch --resume --run-dir runs/first");
+  command->callback([flags, exit_code] {
+    const absl::StatusOr<int> result = RunLaunch(*flags);
+    *exit_code = result.ok() ? *result : Fail("launch", result.status());
+  });
+}
+
+}  // namespace dbr

@@ -1,0 +1,105 @@
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "core/status_macros.h"
+#include "deploy/cli/command_line.h"
+#include "deploy/probe/positions_file.h"
+#include "deploy/probe/probe.h"
+#include "deploy/probe/probe_report.h"
+
+namespace dbr {
+namespace {
+
+struct ProbeFlags {
+  std::string policy;
+  std::string positions;
+  std::optional<std::string> moves;
+  std::string mode = "mode";
+  std::uint64_t seed = 1;
+  bool json = false;
+};
+
+absl::Status ProbeMoves(const ProbeFlags& flags, const PolicyNetworks& policy, ActingMode mode) {
+  const absl::StatusOr<connect4::Board> board = connect4::Board::FromMoves(*flags.moves);
+  if (!board.ok()) return absl::InvalidArgumentError(absl::StrCat("--", board.status().message()));
+  ASSIGN_OR_RETURN(const std::vector<ProbedPosition> probed, Probe(policy, {*board}, mode, flags.seed));
+  const std::string text =
+      flags.json ? ToJson(*flags.moves, probed[0]).dump() + "\n" : Figure(*flags.moves, probed[0]);
+  std::fputs(text.c_str(), stdout);
+  return absl::OkStatus();
+}
+
+absl::Status ProbeFile(const ProbeFlags& flags, const PolicyNetworks& policy, ActingMode mode) {
+  ASSIGN_OR_RETURN(const std::vector<ReferencePosition> positions, LoadPositions(flags.positions));
+  std::vector<connect4::Board> boards;
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    const absl::StatusOr<connect4::Board> board = connect4::Board::FromMoves(positions[i].moves);
+    if (!board.ok()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(flags.positions, ": positions[", i, "].moves: ", board.status().message()));
+    }
+    boards.push_back(*board);
+  }
+  ASSIGN_OR_RETURN(const std::vector<ProbedPosition> probed, Probe(policy, boards, mode, flags.seed));
+  const ProbeShares shares = ScoreMoves(positions, probed);
+  if (flags.json) {
+    std::printf("%s\n", ToJson(shares).dump().c_str());
+    return absl::OkStatus();
+  }
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    std::printf("%s\n", FigureLine(positions[i], probed[i]).c_str());
+  std::printf("columns from 1 to 7; ✓ a best move, ~ keeps the value, ✗ gives it away; × a full column\n\n%s",
+              SharesText(shares).c_str());
+  return absl::OkStatus();
+}
+
+absl::Status RunProbe(const ProbeFlags& flags) {
+  if (flags.positions.empty() == !flags.moves.has_value()) {
+    return absl::InvalidArgumentError("expected one of --positions FILE and --moves COLUMNS");
+  }
+  ASSIGN_OR_RETURN(const ActingMode mode, ParseActingMode(flags.mode));
+  ASSIGN_OR_RETURN(const std::shared_ptr<const PolicyNetworks> policy, OpenPolicy(flags.policy));
+  return flags.moves.has_value() ? ProbeMoves(flags, *policy, mode) : ProbeFile(flags, *policy, mode);
+}
+
+}  // namespace
+
+void AddProbe(CLI::App* app, int* exit_code) {
+  auto flags = std::make_shared<ProbeFlags>();
+  CLI::App* command =
+      app->add_subcommand("probe", "Show what a Connect-4 policy thinks of positions, and how much is right");
+  command->add_option("--policy", flags->policy, "A policy file, or a run folder for its newest one")
+      ->required()
+      ->type_name("FILE_OR_RUN");
+  command
+      ->add_option("--positions", flags->positions,
+                   "Positions with their exact values (tests/reference/connect4)")
+      ->type_name("FILE");
+  command->add_option("--moves", flags->moves, "One position: the columns 1 to 7 played from the empty board")
+      ->type_name("COLUMNS");
+  command->add_option("--mode", flags->mode, "Whose move is judged: sample, mode, greedy_q or support")
+      ->capture_default_str()
+      ->type_name("MODE");
+  command->add_option("--seed", flags->seed, "Of the mode sample")->capture_default_str()->type_name("N");
+  command->add_flag(
+      "--json", flags->json,
+      "Print one JSON object: with a file {positions, must_block, must_win, keeps_value_decisive, best}, "
+      "with moves {moves, to_move, move, pi, beta_plus, beta_minus, beta, q}");
+  command->footer(
+      "Examples:\n"
+      "  dbr probe --policy runs/quickstart --moves 44536\n"
+      "  dbr probe --policy runs/quickstart --positions tests/reference/connect4/tactics.train.json --json");
+  command->callback([flags, exit_code] {
+    const absl::Status status = RunProbe(*flags);
+    *exit_code = status.ok() ? 0 : Fail("probe", status);
+  });
+}
+
+}  // namespace dbr

@@ -1,0 +1,70 @@
+// The evaluations of a run in their order, and what had been done when each policy was made.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "deploy/launch/monitor.h"
+
+namespace dbr {
+
+struct EvaluationPoint {
+  std::string opponent;  // empty where the environment has none
+  std::uint64_t policy_version = 0;
+  std::uint64_t updates = 0;
+  std::uint64_t steps = 0;  // transitions of the actors until then, as near as the launcher's questions tell
+  std::uint64_t episodes = 0;
+  double score_mean = std::numeric_limits<double>::quiet_NaN();  // NaN: the environment has no score
+  double score_stderr = std::numeric_limits<double>::quiet_NaN();
+  double return_mean = 0;
+  double return_std = 0;                                  // of single episodes; NaN for one alone
+  std::optional<std::uint64_t> iteration = std::nullopt;  // of a run that is evaluated by updates
+};
+
+// One thread.
+class EvaluationCurve {
+ public:
+  EvaluationCurve() = default;
+  explicit EvaluationCurve(std::vector<EvaluationPoint> earlier, std::set<std::uint64_t> skipped = {})
+      : points_(std::move(earlier)), skipped_(std::move(skipped)) {}
+
+  // Takes the evaluations that it has not seen, and gives them.
+  std::vector<EvaluationPoint> Update(const RunSample& sample);
+
+  const std::vector<EvaluationPoint>& points() const { return points_; }
+  // The iterations that the evaluators have said to skip.
+  const std::set<std::uint64_t>& skipped() const { return skipped_; }
+  // The latest iteration that was evaluated; empty where none was, and in a run that is evaluated by time.
+  std::optional<std::uint64_t> LastIteration() const;
+
+  // How good the policy was when an offline phase of that many updates ended: the last evaluation of a policy
+  // that no actor had followed yet, unless that was made before the last tenth of the phase and there is one
+  // soon after.
+  std::optional<EvaluationPoint> AfterOffline(std::uint64_t offline_updates) const;
+  // The lowest mean return of those made after the first transition of an actor.
+  std::optional<EvaluationPoint> LowestOnline() const;
+
+ private:
+  struct Moment {
+    std::uint64_t updates = 0;
+    std::uint64_t steps = 0;
+  };
+  static constexpr std::size_t kMoments = 4096;  // more than half an hour of two questions a second
+
+  void Remember(const RunSample& sample);
+  // Between the two moments that it lies between.
+  std::uint64_t StepsAt(std::uint64_t updates) const;
+  bool Knows(const EvaluationReport& report) const;
+
+  std::vector<EvaluationPoint> points_;
+  std::set<std::uint64_t> skipped_;
+  std::deque<Moment> moments_;  // ascending
+};
+
+}  // namespace dbr

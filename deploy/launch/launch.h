@@ -1,0 +1,71 @@
+// A whole run: processes, progress, the end and its table.
+#pragma once
+
+#include <spdlog/logger.h>
+
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+#include "deploy/launch/evaluation_curve.h"
+#include "deploy/launch/health.h"
+#include "deploy/launch/monitor.h"
+#include "deploy/launch/progress.h"
+#include "deploy/launch/results.h"
+#include "deploy/launch/run_plan.h"
+#include "deploy/process/supervisor.h"
+
+namespace dbr {
+
+// Runs one plan once, from the main thread. Everything that the user sees goes to `out`.
+class Launch {
+ public:
+  // `programs`: the folder of dbr-replay, dbr-learner and dbr-actor. Internal where the log cannot be opened.
+  static absl::StatusOr<std::unique_ptr<Launch>> Create(RunPlan plan, std::string programs, std::FILE* out);
+
+  // Starts everything (the actors after the offline phase), trains until a limit of the config or a signal,
+  // stops everything with its state saved, and evaluates the last policy. Blocks; gives the exit status (0,
+  // or 130 after a signal), or the first failure.
+  absl::StatusOr<int> Run();
+
+ private:
+  Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_ptr<spdlog::logger> log);
+  void Announce();
+  absl::Status StartAll();
+  absl::Status StartActors();
+  void TellOfTheSeed();
+  absl::Status WaitUntilServing(const std::string& name, const std::string& address, absl::Duration within);
+  // Watching (launch_watch.cc).
+  absl::Status Train();
+  void Observe(absl::Time now);
+  // Which of the config's limits the run has come to; empty: none.
+  std::string LimitReached(const RunSample& sample, const std::vector<EvaluationPoint>& evaluations) const;
+  bool OfflinePhaseIsOver(const RunSample& sample) const;
+  std::optional<absl::Duration> TimeLeft(const RunSample& sample) const;
+
+  bool StopAll(bool ask);
+  absl::Status FinalEvaluation(bool* interrupted);
+  void Say(const std::string& text);
+  void SaveSummary();
+
+  const RunPlan plan_;
+  const std::string programs_;
+  const std::shared_ptr<spdlog::logger> log_;
+  ProgressLine line_;
+  RunSummary before_;  // of the launches that this one continues
+  RunSummary summary_;
+  absl::Time started_ = absl::InfiniteFuture();
+  absl::Time training_since_ = absl::InfiniteFuture();
+  absl::Time summary_saved_ = absl::InfinitePast();
+  RunSample first_;      // for rates of this launch
+  bool acting_ = false;  // the actors were started
+  std::unique_ptr<Supervisor> supervisor_;
+  std::unique_ptr<RunMonitor> monitor_;
+};
+
+}  // namespace dbr

@@ -1,0 +1,161 @@
+#include "deploy/launch/results.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/file_io.h"
+#include "deploy/launch/summary_reader.h"
+
+namespace dbr {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json Number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+Json Estimate(double mean, double standard_error) {
+  return {{"mean", Number(mean)}, {"stderr", Number(standard_error)}};
+}
+
+Json Spread(double std, double min, double max) {
+  return {{"std", Number(std)}, {"min", Number(min)}, {"max", Number(max)}};
+}
+
+Json ToJson(const EvaluationPoint& point) {
+  Json json = {{"updates", point.updates},
+               {"steps", point.steps},
+               {"return_mean", Number(point.return_mean)},
+               {"return_std", Number(point.return_std)},
+               {"episodes", point.episodes},
+               {"policy_version", point.policy_version}};
+  if (std::isfinite(point.score_mean)) {
+    json["score_mean"] = point.score_mean;
+    json["score_stderr"] = Number(point.score_stderr);
+  }
+  if (!point.opponent.empty()) json["opponent"] = point.opponent;
+  if (point.iteration.has_value()) json["iteration"] = *point.iteration;
+  return json;
+}
+
+Json ToJson(const std::optional<EvaluationPoint>& point) {
+  return point.has_value() ? ToJson(*point) : Json(nullptr);
+}
+
+Json SeedJson(const SeedSummary& seed) {
+  Json returns = {{"mean", Number(seed.return_mean)}};
+  returns.update(Spread(seed.return_std, seed.return_min, seed.return_max));
+  return {{"path", seed.path},         {"rows", seed.rows},
+          {"bad_rows", seed.bad_rows}, {"episodes", seed.episodes},
+          {"return", returns},         {"rows_per_second", Number(seed.rows_per_second)}};
+}
+
+Json ReturnsJson(const RunSummary& summary) {
+  Json end = nullptr;
+  if (!summary.final_results.empty()) {
+    end = ToJson(summary.final_results[0])["return"];
+    end["updates"] = summary.updates;
+    end["steps"] = summary.transitions;
+    end["episodes"] = summary.final_results[0].episodes;
+  }
+  return {{"seed", Number(summary.seed_buffer.return_mean)},
+          {"after_offline", ToJson(summary.AfterOffline())},
+          {"lowest_online", ToJson(summary.curve.LowestOnline())},
+          {"end", end}};
+}
+
+}  // namespace
+
+Json ToJson(const EvaluationResult& result) {
+  Json json = {{"env", result.env},
+               {"opponent", result.opponent},
+               {"episodes", result.episodes},
+               {"seed", result.seed},
+               {"score", Estimate(result.score_mean, result.score_stderr)},
+               {"return", Estimate(result.return_mean, result.return_stderr)}};
+  if (std::isfinite(result.score_mean)) return json;
+  json["return"].update(Spread(result.return_std, result.return_min, result.return_max));
+  json["steps"] = {{"mean", Number(result.length_mean)}};
+  return json;
+}
+
+std::string ResultsPath(const RunFolder& folder) {
+  return absl::StrCat(folder.root, "/results.txt");
+}
+
+std::vector<EvaluationPoint> RunSummary::Update(const RunSample& sample) {
+  if (sample.replay.has_value()) {
+    const StatsReply& replay = *sample.replay;
+    games = replay.episodes();
+    transitions = replay.inserted();
+    seed_buffer.rows = replay.seed_rows();
+    seed_buffer.bad_rows = replay.seed_bad_rows();
+    seed_buffer.episodes = replay.seed_episodes();
+    seed_buffer.return_mean = replay.seed_return_mean();
+    seed_buffer.return_std = replay.seed_return_std();
+    seed_buffer.return_min = replay.seed_return_min();
+    seed_buffer.return_max = replay.seed_return_max();
+    seed_buffer.rows_per_second = replay.seed_rows_per_second();
+  }
+  if (sample.learner.has_value()) {
+    updates = sample.learner->updates();
+    policy_version = sample.learner->policy_version();
+  }
+  return curve.Update(sample);
+}
+
+std::optional<EvaluationPoint> RunSummary::AfterOffline() const {
+  return offline_updates > 0 ? curve.AfterOffline(offline_updates) : std::nullopt;
+}
+
+std::set<std::uint64_t> RunSummary::SkippedIterations() const {
+  std::set<std::uint64_t> skipped = curve.skipped();
+  if (every_updates == 0 || ended == "running") return skipped;
+  const std::optional<std::uint64_t> last = curve.LastIteration();
+  for (std::uint64_t k = last.has_value() ? *last + 1 : 0; k < updates / every_updates; ++k)
+    skipped.insert(k);
+  return skipped;
+}
+
+absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder) {
+  Json evaluations = Json::array();
+  for (const EvaluationPoint& point : summary.curve.points()) evaluations.push_back(ToJson(point));
+  Json final_results = Json::array();
+  for (const EvaluationResult& result : summary.final_results) final_results.push_back(ToJson(result));
+  Json json = {{"env", summary.env},       {"algorithm", summary.algorithm}, {"seed", summary.seed},
+               {"config", summary.config}, {"commit", summary.commit},       {"run_folder", folder.root},
+               {"ended", summary.ended}};
+  if (!summary.failure.empty()) json["failure"] = summary.failure;
+  if (summary.seed_buffer.rows > 0) {
+    json["seed_buffer"] = SeedJson(summary.seed_buffer);
+    json["offline_updates"] = summary.offline_updates;
+    json["returns"] = ReturnsJson(summary);
+  }
+  json.update(Json{{"wall_s", summary.wall_s},
+                   {"training_s", summary.training_s},
+                   {"launches", summary.launches},
+                   {"games", summary.games},
+                   {"transitions", summary.transitions},
+                   {"updates", summary.updates},
+                   {"policy_version", summary.policy_version},
+                   {"restarts", summary.restarts},
+                   {"evaluations", evaluations},
+                   {"skipped_iterations", summary.SkippedIterations()},
+                   {"final", final_results}});
+  // Paths and logs may hold bytes that are not UTF-8.
+  const std::string text = json.dump(2, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace);
+  return WriteFileAtomically(folder.summary(), absl::StrCat(text, "\n"));
+}
+
+RunSummary ReadSummary(const RunFolder& folder) {
+  absl::StatusOr<RunSummary> earlier = LoadSummary(folder);
+  RunSummary summary;
+  if (earlier.ok()) summary = *std::move(earlier);
+  summary.seed_buffer = SeedSummary();
+  return summary;
+}
+
+}  // namespace dbr

@@ -1,0 +1,273 @@
+#include "deploy/launch/run_plan.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <filesystem>
+#include <thread>
+#include <utility>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "actor/evaluator.h"
+#include "actor/exploration.h"
+#include "core/file_io.h"
+#include "core/status_macros.h"
+#include "deploy/launch/results.h"
+#include "deploy/launch/same_run.h"
+#include "envs/env.h"
+#include "learner/algorithm.h"
+#include "proto/config_file.h"
+#include "replay/replay_server.h"
+#include "replay/seed_import.h"
+
+namespace dbr {
+namespace {
+
+// An address that the launcher can hand to others before the server listens.
+absl::StatusOr<std::string> Address(const std::string& configured, const std::string& otherwise,
+                                    const char* field) {
+  if (configured.empty()) return otherwise;
+  if (!absl::EndsWith(configured, ":0")) return configured;
+  return absl::InvalidArgumentError(
+      absl::StrCat(field, ": expected an address that the other processes can be told, found '", configured,
+                   "'. Name a port, or leave it out for a unix socket."));
+}
+
+std::string DefaultRunDir(const Config& config, absl::Time now) {
+  return absl::StrCat("runs/", config.env().name(), "-", AlgorithmName(config), "-",
+                      absl::FormatTime("%Y%m%d-%H%M%S", now, absl::LocalTimeZone()));
+}
+
+absl::Status MakeFolder(const RunFolder& folder) {
+  for (const std::string& path : {folder.root, folder.logs(), folder.checkpoints(), folder.policies()}) {
+    std::error_code error;
+    std::filesystem::create_directories(path, error);
+    if (error) return ErrnoStatus(error.value(), "cannot create", path);
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Config> LoadNamed(const LaunchOptions& options) {
+  if (!options.config.empty()) return LoadConfig(options.config, options.overrides);
+  if (options.resume && !options.run_dir.empty()) {
+    return LoadConfig(RunFolder{options.run_dir}.config(), options.overrides);
+  }
+  return absl::InvalidArgumentError(
+      "which run? Give a config file (for example deploy/configs/connect4.textproto), or --resume with "
+      "--run-dir.");
+}
+
+// The config with what the flags say of the seed, whose path is made absolute.
+absl::StatusOr<Config> LoadForLaunch(const LaunchOptions& options) {
+  ASSIGN_OR_RETURN(Config config, LoadNamed(options));
+  if (options.seed_buffer.empty() && config.replay().seed().path().empty()) {
+    if (options.seed_layout.empty() && !options.skip_bad_rows) return config;
+    return absl::InvalidArgumentError(
+        "--seed-layout and --skip-bad-rows: of which seed? Name it with --seed-buffer.");
+  }
+  SeedConfig* seed = config.mutable_replay()->mutable_seed();
+  if (!options.seed_buffer.empty()) seed->set_path(options.seed_buffer);
+  if (!options.seed_layout.empty()) seed->set_layout(options.seed_layout);
+  if (options.skip_bad_rows) seed->set_skip_bad_rows(true);
+  seed->set_path(std::filesystem::absolute(seed->path()).lexically_normal().string());
+  return config;
+}
+
+// Before a folder is made for a run that could not begin.
+absl::Status CheckSeed(const Config& config, const EnvSpec& env) {
+  if (config.replay().seed().path().empty()) {
+    if (config.learner().offline_updates() == 0) return absl::OkStatus();
+    return absl::InvalidArgumentError(absl::StrCat(
+        "learner.offline_updates: ", config.learner().offline_updates(),
+        " updates are to be made on a seed, and none is named. Give one with --seed-buffer FILE; "
+        "this records one:\n  dbr dataset record --env ",
+        env.name, " --quality medium --steps 1000000 --out ", env.name, "-medium.hdf5"));
+  }
+  return CheckSeedFits(SeedOptionsFrom(config), TransitionLayout::Of(env, NeedsReturns(config.algorithm())),
+                       config.replay().capacity());
+}
+
+// Before hours of training, at whose end alone some of them are met.
+absl::Status CheckOpponents(const std::string& env, const char* field,
+                            const google::protobuf::RepeatedPtrField<std::string>& opponents) {
+  const absl::Status known =
+      MakeEnv({.name = env, .opponents = {opponents.begin(), opponents.end()}}).status();
+  return known.ok() ? known : absl::Status(known.code(), absl::StrCat(field, ": ", known.message()));
+}
+
+// SUPPORT looks at beta+ and beta- of each action, which DBR over discrete actions alone has.
+absl::Status CheckMode(const Config& config, const EnvSpec& env, const char* field, ActingMode mode) {
+  if (mode != SUPPORT) return absl::OkStatus();
+  if (env.actions.kind == ActionKind::kDiscrete && AlgorithmName(config) == "dbr") return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      field, ": expected SAMPLE, MODE or GREEDY_Q, for SUPPORT is for dbr over discrete actions ",
+      "alone; found SUPPORT with ", AlgorithmName(config), " on ", env.name));
+}
+
+absl::Status CheckEpisodes(const char* field, std::uint32_t episodes) {
+  if (episodes <= kMaxEpisodes) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(field, ": expected 1 to ", kMaxEpisodes, ", found ", episodes));
+}
+
+// Whether there is anything that a launch could go on with.
+bool HasBegun(const RunFolder& folder) {
+  std::error_code ignored;
+  return std::filesystem::exists(folder.replay_store(), ignored) ||
+         (std::filesystem::exists(folder.checkpoints(), ignored) &&
+          !std::filesystem::is_empty(folder.checkpoints(), ignored));
+}
+
+absl::Status CheckRunFolder(const RunFolder& folder) {
+  if (std::filesystem::exists(folder.config())) return absl::OkStatus();
+  return absl::NotFoundError(absl::StrCat("--resume: '", folder.root,
+                                          "' is no run folder: it has no config.textproto. ",
+                                          "Name the folder that an earlier launch printed."));
+}
+
+absl::Status CheckResumable(const RunFolder& folder, const Config& config) {
+  ASSIGN_OR_RETURN(const Config before, LoadConfig(folder.config()));
+  const absl::Status same = CheckSameRun(before, config);
+  if (same.ok()) return same;
+  return absl::InvalidArgumentError(
+      absl::StrCat("--resume: '", folder.root, "' holds another run: ", same.message()));
+}
+
+ProcessSpec MakeProcess(const RunPlan& plan, const std::string& programs, const std::string& name,
+                        const char* program, const std::vector<std::string>& arguments, int rank) {
+  ProcessSpec process;
+  process.name = name;
+  process.log = plan.folder.log(name);
+  process.command = {absl::StrCat(programs, "/", program), "--config", plan.folder.config(), "--run-dir",
+                     plan.folder.root};
+  process.command.insert(process.command.end(), arguments.begin(), arguments.end());
+  process.stop_rank = rank;
+  return process;
+}
+
+ProcessSpec MakeActor(const RunPlan& plan, const std::string& programs, const std::string& name, int index) {
+  return MakeProcess(plan, programs, name, "dbr-actor",
+                     {"--index", absl::StrCat(index), "--processes", absl::StrCat(plan.actors), "--replay",
+                      plan.replay_address, "--learner", plan.learner_address},
+                     kStopActors);
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<RunFolderLock>> RunFolderLock::Take(const RunFolder& folder) {
+  const int fd = open(folder.root.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return ErrnoStatus(errno, "cannot open", folder.root);
+  if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    close(fd);
+    return absl::FailedPreconditionError(
+        absl::StrCat("run folder '", folder.root,
+                     "' is in use by another launch. Wait for it or choose another --run-dir."));
+  }
+  return std::unique_ptr<RunFolderLock>(new RunFolderLock(fd));
+}
+
+RunFolderLock::~RunFolderLock() {
+  close(fd_);
+}
+
+absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now) {
+  RunPlan plan;
+  if (options.resume && options.run_dir.empty()) {
+    return absl::InvalidArgumentError("--resume: which run? Name its folder with --run-dir.");
+  }
+  if (options.resume) RETURN_IF_ERROR(CheckRunFolder(RunFolder{options.run_dir}));
+  ASSIGN_OR_RETURN(plan.config, LoadForLaunch(options));
+  ASSIGN_OR_RETURN(plan.env, EnvSpecOf(plan.config));
+  RETURN_IF_ERROR(CheckFits(plan.config, plan.env));
+  plan.folder.root = options.run_dir.empty() ? DefaultRunDir(plan.config, now) : options.run_dir;
+  plan.config_source = options.config.empty() ? plan.folder.config() : options.config;
+  plan.resume = options.resume && HasBegun(plan.folder);
+  if (plan.resume) {
+    RETURN_IF_ERROR(CheckResumable(plan.folder, plan.config));
+  } else if (!options.resume && std::filesystem::exists(plan.folder.root) &&
+             !std::filesystem::is_empty(plan.folder.root)) {
+    return absl::AlreadyExistsError(
+        absl::StrCat("run folder '", plan.folder.root,
+                     "' exists already. Say --resume to continue it, or choose another --run-dir."));
+  }
+  ASSIGN_OR_RETURN(plan.replay_address,
+                   Address(plan.config.replay().address(), plan.folder.replay_address(), "replay.address"));
+  ASSIGN_OR_RETURN(plan.learner_address, Address(plan.config.learner().address(),
+                                                 plan.folder.learner_address(), "learner.address"));
+  if (!plan.resume) RETURN_IF_ERROR(CheckSeed(plan.config, plan.env));
+  plan.actors = ActorProcesses(plan.config);
+  RETURN_IF_ERROR(MakeFolder(plan.folder));
+  ASSIGN_OR_RETURN(plan.lock, RunFolderLock::Take(plan.folder));
+  std::error_code none_there;
+  std::filesystem::remove(ResultsPath(plan.folder), none_there);  // of the launch that this one continues
+  RETURN_IF_ERROR(WriteFileAtomically(plan.folder.config(), PrintConfig(plan.config)));
+  return plan;
+}
+
+std::vector<ProcessSpec> Services(const RunPlan& plan, const std::string& programs) {
+  std::vector<ProcessSpec> all = {
+      MakeProcess(plan, programs, "replay", "dbr-replay", {"--address", plan.replay_address}, kStopReplay),
+      MakeProcess(plan, programs, "learner", "dbr-learner",
+                  {"--replay", plan.replay_address, "--address", plan.learner_address}, kStopLearner)};
+  all[0].stop_grace = absl::Minutes(2);  // it brings the whole store to disk
+  const bool insecure[] = {plan.config.replay().allow_insecure(), plan.config.learner().allow_insecure()};
+  for (int i = 0; i < 2; ++i) {
+    if (insecure[i]) all[i].command.push_back("--allow-insecure");
+    if (plan.resume) all[i].command.push_back("--resume");
+    all[i].restart_arguments = {"--resume"};
+  }
+  all.push_back(MakeActor(plan, programs, "evaluator", 0));
+  all.back().command.push_back("--evaluate");
+  if (plan.resume) all.back().command.push_back("--resume");
+  all.back().restart_arguments = {"--resume"};
+  return all;
+}
+
+std::vector<ProcessSpec> Actors(const RunPlan& plan, const std::string& programs) {
+  std::vector<ProcessSpec> actors;
+  for (int i = 0; i < plan.actors; ++i)
+    actors.push_back(MakeActor(plan, programs, absl::StrCat("actor-", i), i));
+  return actors;
+}
+
+int DefaultActors(int cores) {
+  return std::max(1, cores / 2);
+}
+
+absl::StatusOr<EnvSpec> EnvSpecOf(const Config& config) {
+  ASSIGN_OR_RETURN(
+      const std::unique_ptr<Env> env,
+      MakeEnv({.name = config.env().name(),
+               .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
+  return env->spec();
+}
+
+absl::Status CheckFits(const Config& config, const EnvSpec& env) {
+  RETURN_IF_ERROR(CheckServes(config.algorithm(), env.name, env.actions));
+  RETURN_IF_ERROR(CheckExploration(env, config.actor()));
+  const EvaluationConfig& evaluation = config.evaluation();
+  RETURN_IF_ERROR(CheckMode(config, env, "actor.mode", config.actor().mode()));
+  RETURN_IF_ERROR(CheckMode(config, env, "evaluation.mode", evaluation.mode()));
+  RETURN_IF_ERROR(CheckEpisodes("evaluation.episodes", evaluation.episodes()));
+  RETURN_IF_ERROR(CheckEpisodes("evaluation.final_episodes", evaluation.final_episodes()));
+  RETURN_IF_ERROR(CheckOpponents(env.name, "evaluation.opponents", evaluation.opponents()));
+  return CheckOpponents(env.name, "evaluation.final_opponents", evaluation.final_opponents());
+}
+
+int ActorProcesses(const Config& config) {
+  if (TrainsOfflineAlone(config)) return 0;
+  const int configured = static_cast<int>(config.actor().processes());
+  return configured > 0 ? configured : DefaultActors(static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+std::string AlgorithmName(const Config& config) {
+  const auto* oneof = AlgorithmConfig::descriptor()->FindOneofByName("algorithm");
+  const auto* chosen = config.algorithm().GetReflection()->GetOneofFieldDescriptor(config.algorithm(), oneof);
+  return chosen == nullptr ? "dbr" : chosen->name();
+}
+
+}  // namespace dbr

@@ -1,0 +1,85 @@
+// What a launch is going to do: its config, its folder, its processes.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+#include "core/run_folder.h"
+#include "core/space.h"
+#include "deploy/process/supervisor.h"
+#include "proto/config.pb.h"
+
+namespace dbr {
+
+struct LaunchOptions {
+  std::string config = {};                  // a file; empty with `resume`: the run folder's own
+  std::vector<std::string> overrides = {};  // path=value
+  std::string run_dir = {};                 // empty: runs/ENV-ALGORITHM-DATE-TIME
+  std::string seed_buffer = {};             // replay.seed.path, unless empty
+  std::string seed_layout = {};             // replay.seed.layout, unless empty
+  bool skip_bad_rows = false;               // sets replay.seed.skip_bad_rows
+  bool resume = false;
+};
+
+// Who uses a run folder; freed with the object, or by the kernel when the process dies.
+class RunFolderLock {
+ public:
+  // FailedPrecondition where another launch uses the folder.
+  static absl::StatusOr<std::unique_ptr<RunFolderLock>> Take(const RunFolder& folder);
+  ~RunFolderLock();
+
+ private:
+  explicit RunFolderLock(int fd) : fd_(fd) {}
+  int fd_;
+};
+
+struct RunPlan {
+  Config config;
+  std::string config_source;  // the file that the config came from
+  RunFolder folder;
+  bool resume = false;
+  EnvSpec env;
+  int actors = 1;  // 0: all training is offline
+  std::string replay_address;
+  std::string learner_address;
+  std::unique_ptr<RunFolderLock> lock;
+};
+
+// Loads and checks the config, makes the folder or checks that it can be continued, and writes the effective
+// config. A folder whose run never came to have anything to go on with is begun anew by `resume`. Errors:
+// InvalidArgument for a bad config or seed, what does not fit the environment (CheckFits), or a config that
+// differs from the folder's where that would not continue the same run (each field is named); AlreadyExists
+// where the folder is there and `resume` was not said; NotFound where there is nothing to resume;
+// FailedPrecondition where another launch uses the folder.
+absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now);
+
+// In which order processes are stopped: each saves its state while what it needs is still there.
+enum StopRank { kStopActors, kStopLearner, kStopReplay };
+
+// Replay, learner and evaluator, in the order in which they start. `programs`: the folder of the programs.
+std::vector<ProcessSpec> Services(const RunPlan& plan, const std::string& programs);
+// The actors, who start after the offline phase.
+std::vector<ProcessSpec> Actors(const RunPlan& plan, const std::string& programs);
+
+// The environment that a config names. InvalidArgument where there is none.
+absl::StatusOr<EnvSpec> EnvSpecOf(const Config& config);
+
+// InvalidArgument where the algorithm does not serve the actions of `env`, how actors or the evaluator are to
+// choose is not for them, or an evaluation has too many episodes or an opponent that `env` does not have.
+absl::Status CheckFits(const Config& config, const EnvSpec& env);
+
+// How many a launch of `config` starts on this machine; 0: all training is offline.
+int ActorProcesses(const Config& config);
+
+// Actor processes for a machine of `cores`: half of them, for the learner, the replay and the evaluator want
+// the others.
+int DefaultActors(int cores);
+
+// "dbr", also where the config leaves the algorithm out.
+std::string AlgorithmName(const Config& config);
+
+}  // namespace dbr

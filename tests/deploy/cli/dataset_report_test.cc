@@ -1,0 +1,72 @@
+#include "deploy/cli/dataset_report.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "deploy/terminal/progress_bar.h"
+#include "deploy/terminal/terminal.h"
+
+namespace dbr {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+DatasetReport SmallReport() {
+  DatasetReport report;
+  report.path = "data.hdf5";
+  report.env = "hopper";
+  report.layout = DatasetLayout::kD4rlPybullet;
+  report.facts.rows = 12345;
+  report.facts.transitions = 12000;
+  report.facts.episodes = 30;
+  report.facts.terminals = 20;
+  report.facts.timeouts = 10;
+  report.facts.non_finite = 2;
+  report.facts.return_mean = 1078.25;
+  report.facts.return_std = 3.5;
+  report.facts.return_min = -1;
+  report.facts.return_max = 2000;
+  return report;
+}
+
+TEST(DatasetReportTest, JsonHasTheNamedFieldsInOrder) {
+  EXPECT_EQ(
+      DatasetJson(SmallReport()).dump(),
+      R"({"layout":"d4rl_pybullet","rows":12345,"transitions":12000,"episodes":30,"terminals":20,"timeouts":10,)"
+      R"("non_finite":2,"return":{"mean":1078.25,"std":3.5,"min":-1.0,"max":2000.0}})");
+}
+
+TEST(DatasetReportTest, JsonWithoutEpisodesHasNoReturns) {
+  const nlohmann::ordered_json json = nlohmann::ordered_json::parse(DatasetJson(DatasetReport()).dump());
+  EXPECT_TRUE(json["return"]["mean"].is_null());
+  EXPECT_EQ(json["episodes"], 0);
+}
+
+TEST(DatasetReportTest, TextSaysItForPeople) {
+  EXPECT_THAT(DatasetText(SmallReport()),
+              AllOf(HasSubstr("d4rl_pybullet"), HasSubstr("hopper"), HasSubstr("12,345"),
+                    HasSubstr("30 (20 ended by a terminal, 10 by the time limit)"),
+                    HasSubstr("1078.2 ± 3.5 (from -1.0 to 2000.0)"), HasSubstr("2 rows")));
+}
+
+TEST(ProgressBarTest, SaysHowFarHowFastAndHowLong) {
+  const BarState state{.label = "hopper random",
+                       .unit = "steps",
+                       .done = 450000,
+                       .total = 1000000,
+                       .elapsed = absl::Seconds(45)};
+  EXPECT_EQ(BarText(state, 200),
+            "hopper random  █████████            45%  450k of 1.0M steps · 10k steps/s · 0:55 left");
+  EXPECT_EQ(DisplayWidth(BarText(state, 40)), 40);
+}
+
+TEST(ProgressBarTest, StartsWithoutARate) {
+  const BarState state{.label = "x", .unit = "rows", .done = 0, .total = 10, .elapsed = absl::ZeroDuration()};
+  EXPECT_THAT(BarText(state, 200), HasSubstr("0%  0 of 10 rows · 0 rows/s"));
+}
+
+}  // namespace
+}  // namespace dbr

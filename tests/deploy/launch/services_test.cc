@@ -1,0 +1,127 @@
+// Asking servers: readiness, and the state of a run.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "absl/synchronization/notification.h"
+#include "core/file_io.h"
+#include "core/run_folder.h"
+#include "deploy/cli/command_line.h"
+#include "deploy/launch/health.h"
+#include "deploy/launch/monitor.h"
+#include "proto/config_file.h"
+#include "proto/server.h"
+#include "tests/temp_dir.h"
+
+namespace dbr {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr absl::Duration kLong = absl::Seconds(60);  // reached only where something is wrong
+
+// A replay and a learner that answer with fixed figures.
+class FixedReplay : public Replay::Service {
+ public:
+  grpc::Status Stats(grpc::ServerContext*, const StatsRequest*, StatsReply* reply) override {
+    reply->set_inserted(77);
+    return grpc::Status::OK;
+  }
+};
+class FixedLearner : public Policy::Service {
+ public:
+  grpc::Status Status(grpc::ServerContext*, const LearnerStatusRequest*, LearnerStatus* reply) override {
+    reply->set_updates(5);
+    return grpc::Status::OK;
+  }
+};
+
+TEST(HealthCheckTest, AnswersWhenTheServerServes) {
+  TempDir folder;
+  const std::string address = absl::StrCat("unix:", folder / "s");
+  FixedReplay replay;
+  absl::Notification answered;
+  const HealthCheck check(address, kLong, [&] { answered.Notify(); });
+  EXPECT_FALSE(check.result().has_value());
+  const auto server = StartServer({.address = address}, {&replay});
+  ASSERT_TRUE(server.ok()) << server.status();
+  answered.WaitForNotification();
+  EXPECT_TRUE(check.result()->ok()) << *check.result();
+}
+
+TEST(HealthCheckTest, NamesTheAddressThatDoesNotAnswer) {
+  TempDir folder;
+  absl::Notification answered;
+  const HealthCheck check(absl::StrCat("unix:", folder / "s"), absl::Milliseconds(50),
+                          [&] { answered.Notify(); });
+  answered.WaitForNotification();
+  EXPECT_EQ(check.result()->code(), absl::StatusCode::kDeadlineExceeded);
+  EXPECT_THAT(std::string(check.result()->message()), HasSubstr(folder.path()));
+}
+
+TEST(HealthCheckTest, EndsWhenItIsNoLongerWanted) {
+  TempDir folder;
+  const HealthCheck check(absl::StrCat("unix:", folder / "s"), absl::InfiniteDuration(), [] {});
+}
+
+TEST(RunMonitorTest, KeepsTheNewestAnswersWhileAServiceIsAway) {
+  TempDir folder;
+  const std::string replay_address = absl::StrCat("unix:", folder / "r");
+  const std::string learner_address = absl::StrCat("unix:", folder / "l");
+  FixedReplay replay;
+  FixedLearner learner;
+  auto replay_server = StartServer({.address = replay_address}, {&replay});
+  auto learner_server = StartServer({.address = learner_address}, {&learner});
+  ASSERT_TRUE(replay_server.ok() && learner_server.ok());
+  absl::Notification sampled;
+  RunMonitor monitor(replay_address, learner_address, absl::Hours(1), [&] { sampled.Notify(); });
+  sampled.WaitForNotification();
+  RunSample sample = monitor.Latest();
+  ASSERT_TRUE(sample.replay.has_value() && sample.learner.has_value());
+  EXPECT_EQ(sample.replay->inserted(), 77);
+  EXPECT_EQ(sample.learner->updates(), 5);
+  EXPECT_FALSE(sample.replay_away || sample.learner_away);
+
+  learner_server->server->Shutdown();
+  learner_server->server.reset();
+  sample = monitor.Ask(absl::Seconds(5));
+  EXPECT_TRUE(sample.learner_away);
+  EXPECT_EQ(sample.learner->updates(), 5);
+  EXPECT_FALSE(sample.replay_away);
+}
+
+TEST(ReplayAddressTest, TakesAddressesAndRunFolders) {
+  TempDir folder;
+  EXPECT_EQ(*ReplayAddress("unix:some/replay.sock"), "unix:some/replay.sock");
+  EXPECT_EQ(*ReplayAddress("127.0.0.1:7000"), "127.0.0.1:7000");
+  EXPECT_EQ(ReplayAddress("nothing").status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(ReplayAddress(folder.path()).status().code(), absl::StatusCode::kNotFound);
+  ASSERT_TRUE(WriteFileAtomically(RunFolder{folder.path()}.config(), PrintConfig(Config())).ok());
+  EXPECT_EQ(*ReplayAddress(folder.path()), absl::StrCat("unix:", folder.path(), "/replay.sock"));
+  ASSERT_TRUE(
+      WriteFileAtomically(RunFolder{folder.path()}.config(), "replay { address: '127.0.0.1:7001' }").ok());
+  EXPECT_EQ(*ReplayAddress(folder.path()), "127.0.0.1:7001");
+}
+
+TEST(OpenPolicyTest, NamesTheFileThatCannotBeRead) {
+  TempDir folder;
+  EXPECT_THAT(std::string(OpenPolicy(folder.path()).status().message()),
+              HasSubstr("policy/latest.safetensors"));
+  EXPECT_EQ(OpenPolicy(folder / "none").status().code(), absl::StatusCode::kNotFound);
+  ASSERT_TRUE(WriteFileAtomically(folder / "damaged.safetensors", "not a policy at all").ok());
+  const absl::Status damaged = OpenPolicy(folder / "damaged.safetensors").status();
+  EXPECT_EQ(damaged.code(), absl::StatusCode::kDataLoss);
+  EXPECT_THAT(std::string(damaged.message()), HasSubstr("damaged.safetensors"));
+}
+
+TEST(ParseActingModeTest, TakesAnyCaseAndNamesTheModes) {
+  EXPECT_EQ(*ParseActingMode("greedy_q"), GREEDY_Q);
+  EXPECT_EQ(*ParseActingMode("Support"), SUPPORT);
+  EXPECT_THAT(std::string(ParseActingMode("best").status().message()),
+              HasSubstr("sample, mode, greedy_q or support"));
+}
+
+}  // namespace
+}  // namespace dbr
