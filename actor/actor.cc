@@ -15,8 +15,8 @@
 #include "proto/channel.h"
 #include "proto/config_file.h"
 #include "proto/grpc_status.h"
-#include "replay/await_stats.h"
-#include "replay/client.h"
+#include "replay/client/await_stats.h"
+#include "replay/client/client.h"
 
 namespace dbr {
 namespace {

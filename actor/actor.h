@@ -15,7 +15,7 @@
 #include "envs/env.h"
 #include "proto/config.pb.h"
 #include "proto/policy.grpc.pb.h"
-#include "replay/writer.h"
+#include "replay/client/writer.h"
 
 namespace dbr {
 

@@ -21,7 +21,7 @@
 #include "proto/config_file.h"
 #include "proto/server.h"
 #include "proto/service_main.h"
-#include "replay/await_stats.h"
+#include "replay/client/await_stats.h"
 
 namespace dbr {
 namespace {

@@ -10,7 +10,7 @@
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 #include "core/bounded_queue.h"
-#include "replay/client.h"
+#include "replay/client/client.h"
 
 namespace dbr {
 

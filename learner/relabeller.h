@@ -8,7 +8,7 @@
 
 #include "absl/types/span.h"
 #include "core/bounded_queue.h"
-#include "replay/client.h"
+#include "replay/client/client.h"
 
 namespace dbr {
 

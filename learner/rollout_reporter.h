@@ -7,7 +7,7 @@
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 #include "learner/metrics_sink.h"
-#include "replay/client.h"
+#include "replay/client/client.h"
 
 namespace dbr {
 

@@ -12,7 +12,7 @@
 #include "deploy/cli/stats_report.h"
 #include "deploy/process/interrupt.h"
 #include "deploy/terminal/terminal.h"
-#include "replay/client.h"
+#include "replay/client/client.h"
 
 namespace dbr {
 namespace {

@@ -12,7 +12,7 @@
 #include "absl/time/time.h"
 #include "proto/policy.grpc.pb.h"
 #include "proto/replay.pb.h"
-#include "replay/client.h"
+#include "replay/client/client.h"
 
 namespace dbr {
 

@@ -21,8 +21,8 @@
 #include "envs/env.h"
 #include "learner/algorithm.h"
 #include "proto/config_file.h"
-#include "replay/replay_server.h"
-#include "replay/seed_import.h"
+#include "replay/service/replay_server.h"
+#include "replay/service/seed_import.h"
 
 namespace dbr {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "absl/status/statusor.h"
 #include "replay/dataset/episode.h"
-#include "replay/transition_store.h"
+#include "replay/store/transition_store.h"
 
 namespace dbr {
 

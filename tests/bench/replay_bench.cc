@@ -12,12 +12,12 @@
 #include "absl/time/clock.h"
 #include "core/check.h"
 #include "core/rng.h"
-#include "replay/client.h"
+#include "replay/buffer/partitioned_buffer.h"
+#include "replay/client/client.h"
+#include "replay/client/writer.h"
 #include "replay/dataset/dataset_writer.h"
-#include "replay/partitioned_buffer.h"
-#include "replay/replay_server.h"
-#include "replay/seed_import.h"
-#include "replay/writer.h"
+#include "replay/service/replay_server.h"
+#include "replay/service/seed_import.h"
 
 namespace dbr {
 namespace {

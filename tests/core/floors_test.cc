@@ -29,13 +29,13 @@ const std::vector<Room>& Rooms() {
       {"wire", 1, {"proto/"}},
       {"nn", 1, {"nn/"}},
       {"envs", 1, {"envs/"}},
-      {"replay buffer", 1, {"replay/", "replay/writer_table"}},
+      {"replay buffer", 1, {"replay/", "replay/store/writer_table"}},
       {"offline data", 1, {"replay/dataset/"}},
       {"algorithms", 2, {"learner/algorithm.h", "learner/algorithms/", "learner/parts/"}},
       {"replay service",
        2,
-       {"replay/service", "replay/replay_server", "replay/seed_import", "replay/client", "replay/writer",
-        "replay/outbox", "replay/await_stats"}},
+       {"replay/service/service", "replay/service/replay_server", "replay/service/seed_import",
+        "replay/client/client", "replay/client/writer", "replay/client/outbox", "replay/client/await_stats"}},
       {"actor", 3, {"actor/"}},
       {"learner runtime", 3, {"learner/"}},
       {"deploy", 4, {"deploy/"}},
@@ -128,13 +128,14 @@ TEST(FloorsTest, FindsEachKindOfViolation) {
   using testing::HasSubstr;
   EXPECT_THAT(Violation("core/rng.h", "nn/mlp.h"), HasSubstr("only from floors below"));
   EXPECT_THAT(Violation("nn/mlp.cc", "envs/env.h"), HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("replay/partitioned_buffer.cc", "proto/codec.h"),
+  EXPECT_THAT(Violation("replay/buffer/partitioned_buffer.cc", "proto/codec.h"),
               HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("replay/writer_table.h", "replay/service.h"), HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("replay/selectors/uniform.cc", "grpcpp/grpcpp.h"), HasSubstr("no gRPC"));
+  EXPECT_THAT(Violation("replay/store/writer_table.h", "replay/service/service.h"),
+              HasSubstr("only from floors below"));
+  EXPECT_THAT(Violation("replay/buffer/selectors/uniform.cc", "grpcpp/grpcpp.h"), HasSubstr("no gRPC"));
   EXPECT_THAT(Violation("learner/algorithms/discrete_dbr.cc", "learner/trainer.h"),
               HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("learner/parts/twin_critic.h", "replay/client.h"),
+  EXPECT_THAT(Violation("learner/parts/twin_critic.h", "replay/client/client.h"),
               HasSubstr("only from floors below"));
   EXPECT_THAT(Violation("learner/algorithm.h", "absl/time/clock.h"), HasSubstr("no network, clock or file"));
   EXPECT_THAT(Violation("actor/step_loop.cc", "learner/trainer.h"), HasSubstr("only from floors below"));
@@ -145,9 +146,9 @@ TEST(FloorsTest, FindsEachKindOfViolation) {
 TEST(FloorsTest, AllowsWhatTheHouseAllows) {
   EXPECT_EQ(Violation("learner/algorithms/discrete_dbr.cc", "proto/config.pb.h"), "");
   EXPECT_EQ(Violation("learner/algorithms/discrete_dbr.cc", "nn/mlp.h"), "");
-  EXPECT_EQ(Violation("replay/service.cc", "replay/partitioned_buffer.h"), "");
-  EXPECT_EQ(Violation("replay/writer.cc", "proto/codec.h"), "");
-  EXPECT_EQ(Violation("actor/step_loop.cc", "replay/writer.h"), "");
+  EXPECT_EQ(Violation("replay/service/service.cc", "replay/buffer/partitioned_buffer.h"), "");
+  EXPECT_EQ(Violation("replay/client/writer.cc", "proto/codec.h"), "");
+  EXPECT_EQ(Violation("actor/step_loop.cc", "replay/client/writer.h"), "");
   EXPECT_EQ(Violation("learner/trainer.cc", "learner/algorithm.h"), "");
   EXPECT_EQ(Violation("learner/main.cc", "learner/trainer.h"), "");
   EXPECT_EQ(Violation("core/file_io.cc", "fcntl.h"), "");

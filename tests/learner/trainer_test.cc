@@ -10,8 +10,8 @@
 
 #include "absl/time/clock.h"
 #include "proto/config_file.h"
-#include "replay/replay_server.h"
-#include "replay/writer.h"
+#include "replay/client/writer.h"
+#include "replay/service/replay_server.h"
 #include "tests/learner/batches.h"
 #include "tests/temp_dir.h"
 

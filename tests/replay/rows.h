@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/transition.h"
-#include "replay/buffer_types.h"
+#include "replay/buffer/buffer_types.h"
 
 namespace dbr {
 

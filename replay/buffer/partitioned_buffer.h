@@ -1,0 +1,140 @@
+// The replay buffer: D with its partitions D+ (advantage >= 0), D- (advantage <= 0) and the rows not yet
+// judged.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+#include "absl/types/span.h"
+#include "core/rng.h"
+#include "replay/buffer/buffer_stats.h"
+#include "replay/buffer/buffer_types.h"
+#include "replay/buffer/partitions.h"
+#include "replay/buffer/rate_limiter.h"
+#include "replay/buffer/rate_window.h"
+#include "replay/store/transition_store.h"
+
+namespace dbr {
+
+// Thread-safe behind one lock, which it holds for at most kRowsPerLock inserted rows, one draw or one
+// relabel. Rows are evicted first in, first out; a seed may be pinned, and then the oldest of the others
+// goes. An advantage of 0 lies in D+ and in D-.
+class PartitionedBuffer {
+ public:
+  static constexpr int kRowsPerLock = 256;
+  static constexpr int kSeedRowsPerLock = 4096;
+  static constexpr std::uint64_t kMaxDraws = 1 << 18;     // in one call
+  static constexpr std::uint64_t kMaxRelabels = 1 << 18;  // in one call
+  static constexpr std::uint64_t kLabelsLookedAt = 20000;
+
+  // Takes the rows that the store has. InvalidArgument for options that make no sense. O(size).
+  static absl::StatusOr<std::unique_ptr<PartitionedBuffer>> Make(std::unique_ptr<TransitionStore> store,
+                                                                 const BufferOptions& options);
+
+  // Opens a stream of a writer: a place to insert with, to be closed again. Errors as WriterTable::Open's.
+  absl::StatusOr<std::uint32_t> OpenWriter(const WriterIdentity& identity);
+  void CloseWriter(std::uint32_t place);
+  WriterProgress Progress(std::uint32_t place) const;
+
+  // Stores `batch` row by row as the limiter admits, and moves batch->next_row along. Sequence numbers that
+  // the writer has used are dropped as duplicates; rows with a non-finite value, an infinite advantage or a
+  // discrete action that is none are refused; both are counted by writer. Blocks until the limiter admits.
+  // DeadlineExceeded, naming limiter, counters and bounds (what is stored stays, call again to go on);
+  // Unavailable after Close; InvalidArgument for sequence numbers or ends that make no sense, and where a
+  // pinned seed has every place.
+  absl::Status Insert(std::uint32_t place, InsertBatch* batch, absl::Time deadline);
+
+  // Appends rows of the seed, flat as the layout lays them, not yet judged. The limiter does not ask for
+  // them, nor count them. InvalidArgument where they are more than fit; FailedPrecondition once something
+  // else has been inserted, or after CompleteSeed.
+  absl::Status InsertSeed(absl::Span<const float> rows);
+  // Ends the seed and writes down what is known of it (`record`, but for its counts of rows); with `pin` none
+  // of its rows is ever evicted. FailedPrecondition as InsertSeed's.
+  absl::Status CompleteSeed(const SeedRecord& record, bool pin);
+
+  // Draws with replacement into `out`, all parts under one snapshot. Blocks until the limiter admits and,
+  // unless they may be empty, the asked partitions have something. Errors: DeadlineExceeded, naming what it
+  // waited for; Unavailable after Close; InvalidArgument for no or too many draws. Sets
+  // result->raised_tolerance in either case.
+  absl::Status Draw(const DrawRequest& request, const DrawBuffers& out, absl::Time deadline,
+                    DrawResult* result);
+
+  // Sets the advantages of `keys`, given by a critic of `version`, all under one lock. An older version never
+  // overwrites a newer one. InvalidArgument where the two lengths differ or there are too many.
+  absl::StatusOr<RelabelResult> Relabel(std::uint64_t version, absl::Span<const std::uint64_t> keys,
+                                        absl::Span<const float> advantages);
+
+  // Looks at the labels of no more than kLabelsLookedAt rows and never holds the lock for long: the parts of
+  // the answer may be some milliseconds apart.
+  BufferStats Stats() const;
+
+  void Close();         // ends all waits with Unavailable and refuses later inserts and draws
+  absl::Status Sync();  // writes all to disk; blocks
+
+  const TransitionLayout& layout() const { return layout_; }
+  std::uint64_t capacity() const { return capacity_; }
+
+ private:
+  PartitionedBuffer(std::unique_ptr<TransitionStore> store, const BufferOptions& options,
+                    const RateLimiter& limiter, Partitions partitions);
+
+  // Calls that wait.
+  struct Waiting {
+    std::uint64_t inserts = 0, draws = 0, draws_of_plus = 0, draws_of_minus = 0;
+    DrawRequest newest_draw;
+  };
+
+  absl::Status CheckHasPlace() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status CheckSeedMayCome() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Fills drawn_slots_.
+  void ChooseSlots(int part, std::uint32_t count) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  RateLimiter::Counts Counts() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool CanInsert() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  bool CanDraw(const DrawRequest& request) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::uint64_t EffectiveDraws(const DrawRequest& request) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  std::string WhyDrawWaits(const DrawRequest& request) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status AwaitInsert(absl::Time deadline) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status AwaitDraw(const DrawRequest& request, absl::Time deadline)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  // Drops or refuses the next rows where they are not to be stored; false where none is left.
+  bool SkipRows(std::uint32_t place, const std::vector<bool>& refused, InsertBatch* batch)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void InsertRow(std::uint32_t place, const InsertBatch& batch) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void RelabelRow(std::uint32_t slot, std::uint64_t version, float advantage)
+      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void Evict() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void DrawPart(int part, std::uint32_t count, const DrawColumns& out) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void AddCounts(BufferStats* stats) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void AddWriters(BufferStats* stats) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void AddBlocked(BufferStats* stats) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  void AddEpisodes(BufferStats* stats) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  LabelSummary LookAtLabels() const ABSL_LOCKS_EXCLUDED(mutex_);
+
+  const TransitionLayout layout_;
+  const std::uint64_t capacity_;
+  const bool cumulative_advantage_;
+  const double seed_share_;
+  const std::function<absl::Time()> now_;
+  const absl::Time start_;
+
+  mutable absl::Mutex mutex_;
+  const std::unique_ptr<TransitionStore> store_ ABSL_PT_GUARDED_BY(mutex_);
+  Partitions partitions_ ABSL_GUARDED_BY(mutex_);
+  RateLimiter limiter_ ABSL_GUARDED_BY(mutex_);
+  Rng rng_ ABSL_GUARDED_BY(mutex_);
+  std::vector<std::uint32_t> drawn_slots_ ABSL_GUARDED_BY(mutex_);
+  Waiting waiting_ ABSL_GUARDED_BY(mutex_);
+  RateWindow inserts_ ABSL_GUARDED_BY(mutex_);
+  RateWindow draws_ ABSL_GUARDED_BY(mutex_);
+  RateWindow relabels_ ABSL_GUARDED_BY(mutex_);
+  bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+};
+
+}  // namespace dbr

@@ -1,0 +1,55 @@
+// Typed calls to the replay server for everything but inserting (replay/client/writer.h).
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+#include "absl/types/span.h"
+#include "core/batch.h"
+#include "proto/replay.grpc.pb.h"
+
+namespace dbr {
+
+struct DrawCounts {
+  int uniform = 0;
+  int plus = 0;
+  int minus = 0;
+};
+
+// What one Sample call gave; the caller owns and refills it.
+struct DrawnBatches {
+  Batch uniform;
+  Batch plus;   // size 0 where D+ was empty
+  Batch minus;  // size 0 where D- was empty
+  std::uint64_t total_size = 0, plus_size = 0, minus_size = 0, unjudged_size = 0;
+  std::uint64_t inserted = 0, episodes = 0;
+};
+
+// Thread-safe; calls block until their timeout. Errors carry the server's message: Unavailable where there is
+// none, DeadlineExceeded where the rate limiter held the call (its counters and bounds are in the message).
+class ReplayClient {
+ public:
+  explicit ReplayClient(const std::string& address);
+
+  absl::Status Sample(const DrawCounts& counts, const TransitionLayout& layout, absl::Duration timeout,
+                      DrawnBatches* out);
+  absl::StatusOr<RelabelReply> Relabel(std::uint64_t critic_version, absl::Span<const std::uint64_t> keys,
+                                       absl::Span<const float> advantages, absl::Duration timeout);
+  absl::StatusOr<StatsReply> Stats(absl::Duration timeout);
+
+  // Cancels the calls under way and fails later ones with Cancelled.
+  void Close();
+
+ private:
+  class Impl;
+  std::shared_ptr<Impl> impl_;
+};
+
+}  // namespace dbr

@@ -1,0 +1,95 @@
+// dbr-replay: keeps the transitions of a run and serves them.
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
+
+#include "absl/synchronization/notification.h"
+#include "core/run_folder.h"
+#include "core/shutdown.h"
+#include "core/status_macros.h"
+#include "envs/env.h"
+#include "proto/config_file.h"
+#include "proto/service_main.h"
+#include "replay/service/replay_server.h"
+
+namespace dbr {
+namespace {
+
+absl::StatusOr<ReplayServerOptions> MakeOptions(const ServiceArguments& arguments, const Config& config) {
+  ASSIGN_OR_RETURN(
+      const std::unique_ptr<Env> env,
+      MakeEnv({.name = config.env().name(),
+               .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
+  ReplayServerOptions options =
+      OptionsFrom(config, TransitionLayout::Of(env->spec(), NeedsReturns(config.algorithm())));
+  options.store.env = env->spec().name;
+  options.store.path = arguments.folder.replay_store();
+  options.store.resume = arguments.resume;
+  options.server.address =
+      ChooseAddress(arguments.address, config.replay().address(), arguments.folder.replay_address());
+  options.server.allow_insecure |= arguments.allow_insecure;
+  return options;
+}
+
+void LogSeed(const std::string& path, const SeedRecord& seed) {
+  spdlog::info(
+      "seed {}: {} transitions, {} whole episodes with a mean return of {:.1f}, loaded at {:.0f} rows/s",
+      path, seed.rows, seed.episodes, seed.return_mean, seed.rows_per_second);
+  if (seed.bad_rows > 0)
+    spdlog::warn("seed {}: {} rows with values that are not finite are left out", path, seed.bad_rows);
+}
+
+absl::Status Serve(const ServiceArguments& arguments, const Config& config) {
+  ASSIGN_OR_RETURN(const ReplayServerOptions options, MakeOptions(arguments, config));
+  absl::Notification stop;
+  const ShutdownWatcher watcher([&stop] {
+    if (!stop.HasBeenNotified()) stop.Notify();
+  });
+  ASSIGN_OR_RETURN(const std::unique_ptr<ReplayServer> server, ReplayServer::Start(options));
+  if (arguments.resume) {
+    spdlog::info("resumed {} with {} transitions; {} were incomplete and are dropped", options.store.path,
+                 server->recovered(), server->torn());
+  }
+  if (!options.seed.path.empty()) LogSeed(options.seed.path, server->seed());
+  spdlog::info("listening on {}", server->address());
+  stop.WaitForNotification();
+  spdlog::info("stopping");
+  return server->Stop();
+}
+
+int Main(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("replay"));
+  CLI::App app("Keeps the transitions of a run and serves them.", "dbr-replay");
+  ServiceArguments arguments;
+  AddServiceFlags("Folder of the run, where the store lies", "Continue the store that the run folder has",
+                  &arguments, &app);
+  app.footer("Example: dbr-replay --config deploy/configs/connect4.textproto --run-dir runs/mine");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  const absl::StatusOr<Config> config = LoadConfig(arguments.config_path);
+  if (!config.ok()) {
+    spdlog::error("{}", std::string(config.status().message()));
+    return 2;
+  }
+  std::error_code error;
+  if (!arguments.resume) std::filesystem::create_directories(arguments.folder.root, error);
+  if (const absl::Status status = Serve(arguments, *config); !status.ok()) {
+    spdlog::error("{}", std::string(status.message()));
+    return absl::IsInvalidArgument(status) ? 2 : 1;
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace dbr
+
+int main(int argc, char** argv) {
+  dbr::BlockShutdownSignals();
+  return dbr::Main(argc, argv);
+}

@@ -1,0 +1,67 @@
+// Everything behind the program dbr-replay: store, buffer, service and gRPC server.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "proto/config.pb.h"
+#include "proto/server.h"
+#include "replay/buffer/partitioned_buffer.h"
+#include "replay/service/seed_import.h"
+#include "replay/service/service.h"
+#include "replay/store/seed_record.h"
+#include "replay/store/transition_store.h"
+
+namespace dbr {
+
+struct ReplayServerOptions {
+  StoreOptions store;
+  BufferOptions buffer;
+  SeedOptions seed;
+  ServerOptions server;
+};
+
+// What `config` says, for transitions of that layout; paths and address are the caller's to set. A
+// tolerance of 0 becomes a tenth of capacity * samples_per_insert.
+ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& layout);
+
+// What `config` says of the seed.
+SeedOptions SeedOptionsFrom(const Config& config);
+
+// A running replay server. Thread-compatible.
+class ReplayServer {
+ public:
+  // Loads the seed before it serves. Errors of TransitionStore::Open, PartitionedBuffer::Make, ImportSeed and
+  // StartServer.
+  static absl::StatusOr<std::unique_ptr<ReplayServer>> Start(const ReplayServerOptions& options);
+  ~ReplayServer();  // Stop()
+  ReplayServer(const ReplayServer&) = delete;
+  ReplayServer& operator=(const ReplayServer&) = delete;
+
+  const std::string& address() const { return running_.address; }
+  PartitionedBuffer& buffer() { return *buffer_; }
+  std::uint64_t recovered() const { return recovered_; }  // rows taken over from a store
+  std::uint64_t torn() const { return torn_; }            // rows that were incomplete there, and dropped
+
+  const SeedRecord& seed() const { return seed_; }  // zeros where there is none
+
+  // Accepts no more calls, answers those that wait, and writes the store to disk. Blocks up to some seconds.
+  absl::Status Stop();
+
+ private:
+  static absl::StatusOr<std::unique_ptr<ReplayServer>> StartWith(const ReplayServerOptions& options,
+                                                                 std::unique_ptr<TransitionStore> store);
+  explicit ReplayServer(std::unique_ptr<PartitionedBuffer> buffer)
+      : buffer_(std::move(buffer)), service_(buffer_.get()) {}
+
+  std::unique_ptr<PartitionedBuffer> buffer_;
+  ReplayService service_;
+  RunningServer running_;
+  SeedRecord seed_;
+  std::uint64_t recovered_ = 0;
+  std::uint64_t torn_ = 0;
+};
+
+}  // namespace dbr

@@ -1,0 +1,136 @@
+#include "replay/service/seed_import.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "core/status_macros.h"
+#include "replay/dataset/dataset_reader.h"
+#include "replay/dataset/return_reader.h"
+
+namespace dbr {
+namespace {
+
+absl::Status CheckEnough(const SeedOptions& options, std::uint64_t transitions) {
+  if (transitions > 0 && transitions >= options.min_rows) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("replay.seed.path: expected at least ", std::max<std::uint64_t>(1, options.min_rows),
+                   " transitions (replay.min_size, before which nothing is drawn), found ", transitions,
+                   " in ", options.path, ". Lower replay.min_size or take a larger seed."));
+}
+
+absl::Status CheckRoom(const SeedOptions& options, std::uint64_t transitions, std::uint64_t capacity) {
+  if (transitions > capacity) {
+    return absl::InvalidArgumentError(absl::StrCat("replay.seed.path: the seed ", options.path, " has ",
+                                                   transitions, " transitions, the buffer has room for ",
+                                                   capacity, ". Raise replay.capacity to more than ",
+                                                   transitions, "."));
+  }
+  if (transitions == capacity && options.others_will_come && !options.evict) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "replay.seed.path: the seed ", options.path, " fills all ", capacity,
+        " places of the buffer and is never evicted, so that there is none for what the actors do. Raise "
+        "replay.capacity, or set replay.seed.evict: true."));
+  }
+  return CheckEnough(options, transitions);
+}
+
+// A reader of the file, whose transitions fit.
+absl::StatusOr<std::unique_ptr<DatasetReader>> OpenFitting(const SeedOptions& options,
+                                                           const TransitionLayout& layout,
+                                                           std::uint64_t capacity) {
+  if (layout.mask_width > 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("replay.seed.path: expected an environment with continuous actions, "
+                     "for offline data has none other, found ",
+                     options.env));
+  }
+  if (layout.return_width > 0 && options.discount >= 1) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("algorithm.discount: expected below 1 where the returns of a seed are needed (advantage "
+                     "SIL), for those of "
+                     "episodes that were cut have no bound else, found ",
+                     options.discount));
+  }
+  DatasetOptions dataset{.env = options.env,
+                         .observation_size = layout.observation_width,
+                         .action_width = layout.action_width,
+                         .discount = options.discount,
+                         .skip_bad_rows = options.skip_bad_rows};
+  if (!options.layout.empty()) {
+    ASSIGN_OR_RETURN(dataset.layout, ParseDatasetLayout(options.layout));
+  }
+  ASSIGN_OR_RETURN(std::unique_ptr<DatasetReader> reader, DatasetReader::Open(options.path, dataset));
+  ASSIGN_OR_RETURN(const std::int64_t transitions, reader->CountTransitions());
+  RETURN_IF_ERROR(CheckRoom(options, static_cast<std::uint64_t>(transitions), capacity));
+  return reader;
+}
+
+SeedRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
+  return {.bad_rows = static_cast<std::uint64_t>(facts.non_finite),
+          .episodes = static_cast<std::uint64_t>(facts.episodes),
+          .return_mean = facts.return_mean,
+          .return_std = facts.return_std,
+          .return_min = facts.return_min,
+          .return_max = facts.return_max,
+          .rows_per_second = static_cast<double>(facts.transitions) / absl::ToDoubleSeconds(elapsed)};
+}
+
+// The file's rows, flat as the buffer lays them, with returns where it wants them.
+class SeedRows {
+ public:
+  // `reader` outlives this.
+  SeedRows(DatasetReader* reader, const TransitionLayout& layout, float discount) : reader_(reader) {
+    if (layout.return_width > 0) {
+      returns_.emplace(reader, discount);
+    } else {
+      chunk_.emplace(layout, PartitionedBuffer::kSeedRowsPerLock);
+    }
+  }
+
+  // Some rows; none at the end. Valid until the next call.
+  absl::StatusOr<absl::Span<const float>> Next() {
+    if (returns_.has_value()) return returns_->Next();
+    RETURN_IF_ERROR(reader_->Next(&*chunk_).status());
+    return chunk_->rows();
+  }
+
+ private:
+  DatasetReader* const reader_;
+  std::optional<ReturnReader> returns_;
+  std::optional<TransitionChunk> chunk_;
+};
+
+}  // namespace
+
+absl::Status CheckSeedFits(const SeedOptions& options, const TransitionLayout& layout,
+                           std::uint64_t capacity) {
+  return OpenFitting(options, layout, capacity).status();
+}
+
+absl::StatusOr<SeedRecord> ImportSeed(const SeedOptions& options, PartitionedBuffer* buffer) {
+  const BufferStats before = buffer->Stats();
+  if (before.seed_record.complete != 0) return before.seed_record;
+  const absl::Time start = absl::Now();
+  const TransitionLayout& layout = buffer->layout();
+  ASSIGN_OR_RETURN(const std::unique_ptr<DatasetReader> reader,
+                   OpenFitting(options, layout, buffer->capacity()));
+  SeedRows seed(reader.get(), layout, options.discount);
+  std::uint64_t held_already = before.seed_rows * static_cast<std::uint64_t>(layout.stride());  // floats
+  for (;;) {
+    ASSIGN_OR_RETURN(const absl::Span<const float> rows, seed.Next());
+    if (rows.empty()) break;
+    const std::uint64_t skipped = std::min(held_already, static_cast<std::uint64_t>(rows.size()));
+    held_already -= skipped;
+    RETURN_IF_ERROR(buffer->InsertSeed(rows.subspan(skipped)));
+  }
+  // Bad rows may have been left out.
+  RETURN_IF_ERROR(CheckEnough(options, static_cast<std::uint64_t>(reader->facts().transitions)));
+  RETURN_IF_ERROR(buffer->CompleteSeed(RecordOf(reader->facts(), absl::Now() - start), !options.evict));
+  return buffer->Stats().seed_record;
+}
+
+}  // namespace dbr

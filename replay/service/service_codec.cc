@@ -1,0 +1,199 @@
+#include "replay/service/service_codec.h"
+
+#include <cmath>
+
+#include "absl/strings/str_cat.h"
+#include "core/status_macros.h"
+#include "proto/codec.h"
+
+namespace dbr {
+namespace {
+
+constexpr std::uint64_t kMaxReplyBytes = 256 << 20;
+
+SampledPart* PartOf(int part, SampleReply* reply) {
+  return part == kUniform ? reply->mutable_uniform()
+         : part == kPlus  ? reply->mutable_plus()
+                          : reply->mutable_minus();
+}
+
+// Without writing zeros first.
+template <class Value>
+Value* Room(std::size_t size, google::protobuf::RepeatedField<Value>* field) {
+  if (size == 0) return nullptr;
+  field->Reserve(static_cast<int>(size));
+  return field->AddNAlreadyReserved(static_cast<int>(size));
+}
+
+DrawColumns RoomForPart(std::size_t count, const TransitionLayout& layout, SampledPart* part) {
+  TransitionBatch* batch = part->mutable_transitions();
+  const std::size_t observation = count * layout.observation_width, mask = count * layout.mask_width;
+  return {.keys = Room(count, part->mutable_keys()),
+          .observations = Room(observation, batch->mutable_observations()),
+          .actions = Room(count * layout.action_width, batch->mutable_actions()),
+          .masks = Room(mask, batch->mutable_masks()),
+          .rewards = Room(count, batch->mutable_rewards()),
+          .discounts = Room(count, batch->mutable_discounts()),
+          .returns = Room(count * layout.return_width, batch->mutable_returns()),
+          .next_observations = Room(observation, batch->mutable_next_observations()),
+          .next_masks = Room(mask, batch->mutable_next_masks())};
+}
+
+void EncodeWriter(const WriterSummary& summary, WriterStats* writer) {
+  writer->set_name(summary.identity.name);
+  writer->set_id(summary.identity.id);
+  writer->set_source(summary.identity.source == Source::kSeed ? SEED : ONLINE);
+  writer->set_inserted(summary.inserted);
+  writer->set_last_sequence(summary.last_sequence);
+  writer->set_duplicates(summary.duplicates);
+  writer->set_refused(summary.refused);
+  writer->set_held(summary.held);
+  writer->set_connected(summary.connected);
+}
+
+void EncodeCounts(const BufferStats& stats, StatsReply* reply) {
+  reply->set_total(stats.total);
+  reply->set_plus(stats.plus);
+  reply->set_minus(stats.minus);
+  reply->set_unjudged(stats.unjudged);
+  reply->set_seed(stats.seed);
+  reply->set_seed_plus(stats.seed_plus);
+  reply->set_seed_minus(stats.seed_minus);
+  reply->set_capacity(stats.capacity);
+  reply->set_bytes(stats.bytes);
+  reply->set_inserted(stats.inserted);
+  reply->set_sampled(stats.counters.sampled);
+  reply->set_evicted(stats.evicted);
+  reply->set_relabelled(stats.counters.relabelled);
+  reply->set_relabel_evicted(stats.counters.relabel_evicted);
+  reply->set_relabel_stale(stats.counters.relabel_stale);
+  reply->set_refused(stats.counters.refused);
+  reply->set_duplicates(stats.counters.duplicates);
+  reply->set_episodes(stats.counters.episodes);
+  reply->set_sampled_offline(stats.counters.sampled_offline);
+}
+
+void EncodeSeed(const BufferStats& stats, StatsReply* reply) {
+  const SeedRecord& record = stats.seed_record;
+  const auto number = [&record](double value) { return record.complete != 0 ? value : std::nan(""); };
+  reply->set_seed_rows(stats.seed_rows);
+  reply->set_seed_bad_rows(record.bad_rows);
+  reply->set_seed_episodes(record.episodes);
+  reply->set_seed_return_mean(number(record.return_mean));
+  reply->set_seed_return_std(number(record.return_std));
+  reply->set_seed_return_min(number(record.return_min));
+  reply->set_seed_return_max(number(record.return_max));
+  reply->set_seed_rows_per_second(record.rows_per_second);
+}
+
+}  // namespace
+
+absl::StatusOr<WriterIdentity> DecodeOpening(const InsertRequest& request) {
+  if (request.has_transitions()) {
+    return absl::InvalidArgumentError(
+        "the first message of a stream: expected a writer's name and id and no transitions, found "
+        "transitions");
+  }
+  return WriterIdentity{.id = request.writer_id(), .name = request.writer_name()};
+}
+
+absl::StatusOr<InsertBatch> DecodeInsert(const InsertRequest& request, const TransitionLayout& layout,
+                                         std::vector<RowEnd>* ends) {
+  const TransitionBatch& batch = request.transitions();
+  RETURN_IF_ERROR(CheckShape(batch, layout));
+  ends->clear();
+  for (const EpisodeEndMessage& end : request.episode_ends()) {
+    if (end.row() >= batch.count()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("episode_ends: expected a row below ", batch.count(), ", found ", end.row()));
+    }
+    ends->push_back(
+        {static_cast<int>(end.row()), {end.return_(), end.score(), static_cast<int>(end.length())}});
+  }
+  InsertBatch decoded;
+  decoded.first_sequence = request.first_sequence();
+  decoded.ends = *ends;
+  decoded.columns = {
+      .count = static_cast<int>(batch.count()),
+      .observations = batch.observations().data(),
+      .actions = batch.actions().data(),
+      .masks = batch.masks().data(),
+      .rewards = batch.rewards().data(),
+      .discounts = batch.discounts().data(),
+      .returns = batch.returns().data(),
+      .next_observations = batch.next_observations().data(),
+      .next_masks = batch.next_masks().data(),
+      .advantages = batch.advantages().empty() ? nullptr : batch.advantages().data(),
+      .critic_versions = batch.critic_versions().empty() ? nullptr : batch.critic_versions().data()};
+  return decoded;
+}
+
+absl::StatusOr<DrawRequest> DecodeSample(const SampleRequest& request, const TransitionLayout& layout) {
+  const std::uint64_t row_bytes =
+      static_cast<std::uint64_t>(layout.stride()) * sizeof(float) + sizeof(std::uint64_t);
+  const std::uint64_t asked = std::uint64_t{request.uniform()} + request.plus() + request.minus();
+  if (asked > kMaxReplyBytes / row_bytes) {
+    return absl::InvalidArgumentError(absl::StrCat("sample: expected at most ", kMaxReplyBytes / row_bytes,
+                                                   " transitions of ", row_bytes,
+                                                   " bytes in one call, found ", asked));
+  }
+  return DrawRequest{.counts = {request.uniform(), request.plus(), request.minus()},
+                     .allow_empty_partitions = request.allow_empty_partitions()};
+}
+
+DrawBuffers MakeRoom(const DrawRequest& request, const TransitionLayout& layout, SampleReply* reply) {
+  DrawBuffers buffers;
+  for (int part = 0; part < kDrawnParts; ++part) {
+    buffers[part] = RoomForPart(request.counts[part], layout, PartOf(part, reply));
+  }
+  return buffers;
+}
+
+void Encode(const DrawResult& result, const TransitionLayout& layout, SampleReply* reply) {
+  for (int part = 0; part < kDrawnParts; ++part) {
+    SampledPart* message = PartOf(part, reply);
+    if (result.drawn[part] == 0) message->Clear();
+    message->mutable_transitions()->set_count(result.drawn[part]);
+    SetLayout(layout, message->mutable_transitions());
+  }
+  reply->set_total_size(result.total);
+  reply->set_plus_size(result.plus);
+  reply->set_minus_size(result.minus);
+  reply->set_unjudged_size(result.unjudged);
+  reply->set_inserted(result.inserted);
+  reply->set_episodes(result.episodes);
+}
+
+void Encode(const RelabelResult& result, RelabelReply* reply) {
+  reply->set_relabelled(result.relabelled);
+  reply->set_evicted(result.evicted);
+  reply->set_stale(result.stale);
+  reply->set_refused(result.refused);
+}
+
+void Encode(const BufferStats& stats, StatsReply* reply) {
+  EncodeCounts(stats, reply);
+  EncodeSeed(stats, reply);
+  reply->set_insert_rate(stats.insert_rate);
+  reply->set_sample_rate(stats.sample_rate);
+  reply->set_relabel_rate(stats.relabel_rate);
+  reply->set_samples_per_insert(stats.samples_per_insert);
+  reply->set_newest_critic_version(stats.counters.newest_label);
+  reply->set_label_age_mean(stats.labels.age_mean);
+  reply->set_label_age_p95(stats.labels.age_p95);
+  reply->mutable_advantage_edges()->Assign(stats.labels.edges.begin(), stats.labels.edges.end());
+  reply->mutable_advantage_histogram()->Assign(stats.labels.histogram.begin(), stats.labels.histogram.end());
+  for (const WriterSummary& writer : stats.writers) EncodeWriter(writer, reply->add_writers());
+  for (const BlockedCalls& blocked : stats.blocked) {
+    BlockedClients* message = reply->add_blocked();
+    message->set_call(blocked.call);
+    message->set_clients(blocked.clients);
+    message->set_why(blocked.why);
+  }
+  reply->set_recent_return_mean(stats.recent_return_mean);
+  reply->set_recent_score_mean(stats.recent_score_mean);
+  reply->set_recent_length_mean(stats.recent_length_mean);
+  reply->set_uptime_s(stats.uptime_s);
+}
+
+}  // namespace dbr
