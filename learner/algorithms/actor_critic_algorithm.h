@@ -9,7 +9,7 @@
 
 namespace dbr {
 
-// Networks: ActorCritic (learner/parts/actor_critic.h) or what derives from it.
+// Networks: ActorCritic (learner/training/actor_critic.h) or what derives from it.
 template <class Networks>
 class ActorCriticAlgorithm {
  public:

@@ -1,8 +1,8 @@
 #include "learner/algorithms/awac.h"
 
 #include "learner/algorithms/algorithm_adapter.h"
-#include "learner/parts/advantage_weights.h"
-#include "learner/parts/update_metrics.h"
+#include "learner/objectives/advantage_weights.h"
+#include "learner/training/update_metrics.h"
 
 namespace dbr {
 

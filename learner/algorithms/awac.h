@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "learner/algorithms/actor_critic_algorithm.h"
-#include "learner/parts/actor_critic.h"
-#include "learner/parts/critic_regression.h"
-#include "learner/parts/gaussian_likelihood.h"
-#include "learner/parts/sampled_actions.h"
+#include "learner/objectives/critic_regression.h"
+#include "learner/objectives/gaussian_likelihood.h"
+#include "learner/objectives/sampled_actions.h"
+#include "learner/training/actor_critic.h"
 
 namespace dbr {
 

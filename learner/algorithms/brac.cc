@@ -1,7 +1,7 @@
 #include "learner/algorithms/brac.h"
 
 #include "learner/algorithms/algorithm_adapter.h"
-#include "learner/parts/update_metrics.h"
+#include "learner/training/update_metrics.h"
 
 namespace dbr {
 template <class Scalar>

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "learner/algorithms/actor_critic_algorithm.h"
-#include "learner/parts/actor_critic.h"
-#include "learner/parts/behavior_kl_objective.h"
-#include "learner/parts/critic_regression.h"
-#include "learner/parts/gaussian_likelihood.h"
-#include "learner/parts/multiplier.h"
+#include "learner/objectives/behavior_kl_objective.h"
+#include "learner/objectives/critic_regression.h"
+#include "learner/objectives/gaussian_likelihood.h"
+#include "learner/training/actor_critic.h"
+#include "learner/training/multiplier.h"
 
 namespace dbr {
 

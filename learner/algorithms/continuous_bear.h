@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "learner/algorithms/actor_critic_algorithm.h"
-#include "learner/parts/bear_networks.h"
-#include "learner/parts/bear_objective.h"
-#include "learner/parts/behavior_vae.h"
-#include "learner/parts/critic_regression.h"
-#include "learner/parts/greatest_target.h"
+#include "learner/algorithms/bear_networks.h"
+#include "learner/objectives/bear_objective.h"
+#include "learner/objectives/critic_regression.h"
+#include "learner/objectives/greatest_target.h"
+#include "learner/training/behavior_vae.h"
 
 namespace dbr {
 

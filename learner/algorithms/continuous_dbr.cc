@@ -1,7 +1,7 @@
 #include "learner/algorithms/continuous_dbr.h"
 
 #include "learner/algorithms/algorithm_adapter.h"
-#include "learner/parts/munchausen.h"
+#include "learner/objectives/munchausen.h"
 
 namespace dbr {
 

@@ -5,12 +5,12 @@
 #include <vector>
 
 #include "learner/algorithms/actor_critic_algorithm.h"
-#include "learner/parts/critic_regression.h"
-#include "learner/parts/dual_behavior_networks.h"
-#include "learner/parts/dual_behavior_objective.h"
-#include "learner/parts/gaussian_likelihood.h"
-#include "learner/parts/greatest_target.h"
-#include "learner/parts/self_imitation.h"
+#include "learner/algorithms/dual_behavior_networks.h"
+#include "learner/objectives/critic_regression.h"
+#include "learner/objectives/dual_behavior_objective.h"
+#include "learner/objectives/gaussian_likelihood.h"
+#include "learner/objectives/greatest_target.h"
+#include "learner/objectives/self_imitation.h"
 
 namespace dbr {
 

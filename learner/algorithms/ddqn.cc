@@ -1,11 +1,11 @@
 #include "learner/algorithms/ddqn.h"
 
 #include "learner/algorithms/algorithm_adapter.h"
-#include "learner/parts/critic_target.h"
-#include "learner/parts/discrete_losses.h"
-#include "learner/parts/learning_rate.h"
-#include "learner/parts/policy_export.h"
-#include "learner/parts/update_metrics.h"
+#include "learner/objectives/critic_target.h"
+#include "learner/objectives/discrete_losses.h"
+#include "learner/training/learning_rate.h"
+#include "learner/training/policy_export.h"
+#include "learner/training/update_metrics.h"
 
 namespace dbr {
 

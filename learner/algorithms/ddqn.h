@@ -7,7 +7,7 @@
 
 #include "core/rng.h"
 #include "learner/algorithm.h"
-#include "learner/parts/trained_network.h"
+#include "learner/training/trained_network.h"
 
 namespace dbr {
 

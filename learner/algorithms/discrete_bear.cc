@@ -1,7 +1,7 @@
 #include "learner/algorithms/discrete_bear.h"
 
 #include "learner/algorithms/algorithm_adapter.h"
-#include "learner/parts/critic_target.h"
+#include "learner/objectives/critic_target.h"
 
 namespace dbr {
 

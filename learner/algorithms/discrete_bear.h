@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "learner/algorithms/actor_critic_algorithm.h"
-#include "learner/parts/bear_networks.h"
-#include "learner/parts/categorical_likelihood.h"
-#include "learner/parts/discrete_losses.h"
+#include "learner/algorithms/bear_networks.h"
+#include "learner/objectives/categorical_likelihood.h"
+#include "learner/objectives/discrete_losses.h"
 
 namespace dbr {
 

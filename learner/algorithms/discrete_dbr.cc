@@ -1,8 +1,8 @@
 #include "learner/algorithms/discrete_dbr.h"
 
 #include "learner/algorithms/algorithm_adapter.h"
-#include "learner/parts/critic_target.h"
-#include "learner/parts/munchausen.h"
+#include "learner/objectives/critic_target.h"
+#include "learner/objectives/munchausen.h"
 
 namespace dbr {
 template <class Scalar>

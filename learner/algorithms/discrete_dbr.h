@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "learner/algorithms/actor_critic_algorithm.h"
-#include "learner/parts/categorical_likelihood.h"
-#include "learner/parts/discrete_losses.h"
-#include "learner/parts/dual_behavior_networks.h"
-#include "learner/parts/self_imitation.h"
+#include "learner/algorithms/dual_behavior_networks.h"
+#include "learner/objectives/categorical_likelihood.h"
+#include "learner/objectives/discrete_losses.h"
+#include "learner/objectives/self_imitation.h"
 
 namespace dbr {
 

@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "learner/parts/policy_export.h"
-#include "learner/parts/tensor_state.h"
+#include "learner/training/policy_export.h"
+#include "learner/training/tensor_state.h"
 
 namespace dbr {
 namespace {

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "learner/algorithms/actor_critic_algorithm.h"
-#include "learner/parts/continuous_losses.h"
-#include "learner/parts/critic_regression.h"
-#include "learner/parts/sampled_actions.h"
-#include "learner/parts/soft_networks.h"
-#include "learner/parts/soft_policy_objective.h"
+#include "learner/algorithms/soft_networks.h"
+#include "learner/objectives/continuous_losses.h"
+#include "learner/objectives/critic_regression.h"
+#include "learner/objectives/sampled_actions.h"
+#include "learner/objectives/soft_policy_objective.h"
 #include "nn/gaussian_head.h"
 
 namespace dbr {

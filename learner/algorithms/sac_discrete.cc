@@ -1,8 +1,8 @@
 #include "learner/algorithms/sac_discrete.h"
 
 #include "learner/algorithms/algorithm_adapter.h"
-#include "learner/parts/critic_target.h"
-#include "learner/parts/discrete_losses.h"
+#include "learner/objectives/critic_target.h"
+#include "learner/objectives/discrete_losses.h"
 
 namespace dbr {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "learner/algorithms/actor_critic_algorithm.h"
-#include "learner/parts/soft_networks.h"
+#include "learner/algorithms/soft_networks.h"
 #include "nn/categorical.h"
 
 namespace dbr {

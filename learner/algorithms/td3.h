@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "learner/algorithms/actor_critic_algorithm.h"
-#include "learner/parts/actor_critic.h"
-#include "learner/parts/critic_regression.h"
-#include "learner/parts/deterministic_policy.h"
+#include "learner/objectives/critic_regression.h"
+#include "learner/objectives/deterministic_policy.h"
+#include "learner/training/actor_critic.h"
 #include "nn/gaussian_head.h"
 
 namespace dbr {

@@ -133,12 +133,13 @@ TEST(FloorsTest, FindsEachKindOfViolation) {
   EXPECT_THAT(Violation("replay/store/writer_table.h", "replay/service/service.h"),
               HasSubstr("only from floors below"));
   EXPECT_THAT(Violation("replay/buffer/selectors/uniform.cc", "grpcpp/grpcpp.h"), HasSubstr("no gRPC"));
-  EXPECT_THAT(Violation("learner/algorithms/discrete_dbr.cc", "learner/trainer.h"),
+  EXPECT_THAT(Violation("learner/algorithms/discrete_dbr.cc", "learner/runtime/trainer.h"),
               HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("learner/parts/twin_critic.h", "replay/client/client.h"),
+  EXPECT_THAT(Violation("learner/training/twin_critic.h", "replay/client/client.h"),
               HasSubstr("only from floors below"));
   EXPECT_THAT(Violation("learner/algorithm.h", "absl/time/clock.h"), HasSubstr("no network, clock or file"));
-  EXPECT_THAT(Violation("actor/step_loop.cc", "learner/trainer.h"), HasSubstr("only from floors below"));
+  EXPECT_THAT(Violation("actor/step_loop.cc", "learner/runtime/trainer.h"),
+              HasSubstr("only from floors below"));
   EXPECT_THAT(Violation("core/rng.h", "tests/temp_dir.h"), HasSubstr("tests are above"));
   EXPECT_THAT(Violation("elsewhere/file.cc", "core/rng.h"), HasSubstr("no room"));
 }
@@ -149,8 +150,8 @@ TEST(FloorsTest, AllowsWhatTheHouseAllows) {
   EXPECT_EQ(Violation("replay/service/service.cc", "replay/buffer/partitioned_buffer.h"), "");
   EXPECT_EQ(Violation("replay/client/writer.cc", "proto/codec.h"), "");
   EXPECT_EQ(Violation("actor/step_loop.cc", "replay/client/writer.h"), "");
-  EXPECT_EQ(Violation("learner/trainer.cc", "learner/algorithm.h"), "");
-  EXPECT_EQ(Violation("learner/main.cc", "learner/trainer.h"), "");
+  EXPECT_EQ(Violation("learner/runtime/trainer.cc", "learner/algorithm.h"), "");
+  EXPECT_EQ(Violation("learner/runtime/main.cc", "learner/runtime/trainer.h"), "");
   EXPECT_EQ(Violation("core/file_io.cc", "fcntl.h"), "");
 }
 

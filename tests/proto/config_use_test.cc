@@ -1,6 +1,6 @@
 // No field of the config that nothing reads: each has an accessor's call in the sources of the rooms that it
-// is for. (tests/learner/config_effect_test.cc proves more of the algorithms' fields: that they have an
-// effect.)
+// is for. (tests/learner/algorithms/config_effect_test.cc proves more of the algorithms' fields: that they
+// have an effect.)
 #include <google/protobuf/descriptor.h>
 #include <gtest/gtest.h>
 

@@ -1,0 +1,70 @@
+// What SAC trains, whatever the actions: an actor-critic and its temperature, and the parts of an update that
+// do not depend on the kind of action.
+#pragma once
+
+#include <vector>
+
+#include "absl/status/status.h"
+#include "learner/objectives/soft_policy_loss.h"
+#include "learner/training/actor_critic.h"
+#include "learner/training/multiplier.h"
+#include "learner/training/update_metrics.h"
+
+namespace dbr {
+
+// A temperature may fall low where rewards are small; above e^5 it is out of hand.
+inline constexpr MultiplierLimits kTemperatureLimits{.min_log = -20, .max_log = 5};
+
+template <class Scalar>
+struct SoftNetworks : ActorCritic<Scalar> {
+  // `config` is the SacConfig or the SacDiscreteConfig of the spec.
+  template <class TemperatureConfig>
+  SoftNetworks(const AlgorithmSpec& spec, const TemperatureConfig& config)
+      : ActorCritic<Scalar>(spec, /*policy_target=*/false),
+        temperature(config.first_temperature(), config.temperature_learning_rate(), kTemperatureLimits) {}
+
+  // The temperature's step (it rises while the policy's entropy is below target_entropy, both in nats), and
+  // the targets'.
+  void Finish(const SoftPolicyLoss<Scalar>& loss, Scalar target_entropy) {
+    temperature.Step(target_entropy - loss.entropy);
+    this->UpdateTargets();
+    ++this->updates;
+  }
+
+  // Useful operations for n samples of what both kinds of action need: the critics' targets and fits, the
+  // policy at s and s', and its gradient.
+  double UpdateFlops(Eigen::Index n) const {
+    const MlpShape& shape = this->policy.shape();
+    return this->critics.TargetFlops(n) + this->critics.FitFlops(n) + 2 * shape.ForwardFlops(n) +
+           shape.ParameterGradientFlops(n);
+  }
+
+  static std::vector<UpdateMetric> Metrics() {
+    return {{"train/critic_loss"},    {"train/actor_loss"},         {"train/temperature"},
+            {"train/policy_entropy"}, {"train/value_mean"},         {"train/target_mean"},
+            {"train/advantage_mean"}, {"train/advantage_positive"}, {"train/advantage_std"}};
+  }
+
+  // Sets `metrics`; Internal where one is not finite.
+  absl::Status Report(Scalar critic_loss, const SoftPolicyLoss<Scalar>& loss, Scalar target_mean,
+                      std::vector<UpdateMetric>* metrics) const {
+    const AdvantageFigures figures = FiguresOf(this->advantages);
+    return SetMetrics({critic_loss, loss.loss, temperature.value(), loss.entropy, loss.value, target_mean,
+                       figures.mean, figures.positive, figures.deviation},
+                      this->updates, metrics);
+  }
+
+  void Save(TensorFile* file) const {
+    ActorCritic<Scalar>::Save(file);
+    temperature.Save(file);
+  }
+  absl::Status Load(const TensorFile& file) {
+    absl::Status status = ActorCritic<Scalar>::Load(file);
+    status.Update(temperature.Load(file));
+    return status;
+  }
+
+  Multiplier<Scalar> temperature;
+};
+
+}  // namespace dbr

@@ -1,0 +1,53 @@
+// DBR's policy loss over continuous actions with its gradient.
+#pragma once
+
+#include "learner/objectives/continuous_losses.h"
+#include "learner/objectives/dual_behavior.h"
+#include "learner/objectives/gaussian_divergence.h"
+#include "learner/objectives/sampled_q_objective.h"
+#include "learner/training/twin_critic.h"
+
+namespace dbr {
+
+// Noise of one evaluation of the loss.
+template <class Scalar>
+struct ObjectiveNoise {
+  MatrixX<Scalar> actions;          // [dimensions x samples * n]
+  MatrixX<Scalar> pi, plus, minus;  // [dimensions x n * divergence samples]; empty for an exact divergence
+};
+
+// The three policies at the states of a batch.
+template <class Scalar>
+struct PolicyHeads {
+  const GaussianHead<Scalar>& pi;
+  const GaussianHead<Scalar>& beta_plus;
+  const GaussianHead<Scalar>& beta_minus;
+};
+
+// Workspaces, reused from batch to batch.
+template <class Scalar>
+class DualBehaviorObjective {
+ public:
+  // -E[min_i mean_k Q_i(s, a_k)] / scale - w H(pi) + alpha * (D(pi, beta+) - c), a_k drawn from pi, c by
+  // options.constraint (docs/algorithms.md, DBR step 3; NONE leaves that term out), and its gradient with
+  // respect to the output of pi's network [2 * dimensions x n]. beta+, beta-, the critics' weights and the
+  // scale of normalize_q are constants; so is c unless repel_negative. The entropy is that of the draws.
+  PolicyLoss<Scalar> Compute(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
+                             const MatrixX<Scalar>& observations, const ObjectiveNoise<Scalar>& noise,
+                             Scalar alpha, TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output);
+
+  // V(s) [n]: the mean over the draws of the smaller twin.
+  void StateValue(const TwinCritic<Scalar>& critics, VectorX<Scalar>* value) const {
+    MeanOfSmaller<Scalar>(critics.value1(), critics.value2(), value);
+  }
+
+ private:
+  void AddConstraint(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
+                     const ObjectiveNoise<Scalar>& noise, Scalar alpha, PolicyLoss<Scalar>* result);
+
+  SampledQObjective<Scalar> q_objective_;
+  GaussianDivergence<Scalar> plus_, minus_;
+  GaussianGradient<Scalar> gradient_;
+};
+
+}  // namespace dbr

@@ -1,0 +1,65 @@
+#include "learner/objectives/gaussian_divergence.h"
+
+#include <cmath>
+
+#include "core/check.h"
+
+namespace dbr {
+namespace {
+
+// mean + std * noise, a group of columns of the noise for each state.
+template <class Scalar>
+void Spread(const GaussianHead<Scalar>& head, const MatrixX<Scalar>& noise, MatrixX<Scalar>* samples) {
+  const Eigen::Index count = noise.cols() / head.mean().cols();
+  samples->resize(noise.rows(), noise.cols());
+  for (Eigen::Index j = 0; j < noise.cols(); ++j) {
+    samples->col(j) = head.mean().col(j / count) +
+                      head.log_std().col(j / count).array().exp().matrix().cwiseProduct(noise.col(j));
+  }
+}
+
+}  // namespace
+
+template <class Scalar>
+void GaussianDivergence<Scalar>::Compute(const GaussianDivergenceOptions& options,
+                                         const GaussianHead<Scalar>& pi, const GaussianHead<Scalar>& beta,
+                                         const Noise& noise) {
+  switch (options.kind) {
+    case DbrConfig::KL:
+      GaussianKl<Scalar>(pi.view(), beta.view(), &value_, &gradient_, nullptr);
+      return;
+    case DbrConfig::MMD_EXACT:
+      ExactMmd<Scalar>(pi.view(), beta.view(), options.mmd_sigma, &value_, &gradient_);
+      return;
+    case DbrConfig::MMD_LAPLACIAN:
+    case DbrConfig::MMD_GAUSSIAN:
+      Spread(beta, noise.beta, &beta_samples_);
+      ComputeFrom(options, pi, noise.pi, beta_samples_);
+  }
+}
+
+template <class Scalar>
+void GaussianDivergence<Scalar>::ComputeFrom(const GaussianDivergenceOptions& options,
+                                             const GaussianHead<Scalar>& pi, const MatrixX<Scalar>& pi_noise,
+                                             const MatrixX<Scalar>& beta_samples) {
+  const Eigen::Index n = pi.mean().cols();
+  DBR_CHECK(IsSampled(options.kind) && pi_noise.cols() % n == 0 && beta_samples.cols() % n == 0 &&
+            pi_noise.cols() > 0);
+  const KernelKind kernel =
+      options.kind == DbrConfig::MMD_GAUSSIAN ? KernelKind::kGaussian : KernelKind::kLaplacian;
+  Spread(pi, pi_noise, &pi_samples_);
+  SampledMmd<Scalar>({pi_samples_, beta_samples, n}, {kernel, options.mmd_sigma}, &value_, &d_samples_);
+  const Eigen::Index count = pi_noise.cols() / n;
+  gradient_.mean.setZero(pi.mean().rows(), n);
+  gradient_.log_std.setZero(pi.mean().rows(), n);
+  for (Eigen::Index j = 0; j < d_samples_.cols(); ++j) {
+    gradient_.mean.col(j / count) += d_samples_.col(j);
+    gradient_.log_std.col(j / count) += d_samples_.col(j).cwiseProduct(pi_noise.col(j));
+  }
+  gradient_.log_std.array() *= pi.log_std().array().exp();
+}
+
+template class GaussianDivergence<float>;
+template class GaussianDivergence<double>;
+
+}  // namespace dbr

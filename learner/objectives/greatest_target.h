@@ -1,0 +1,36 @@
+// V'(s') over continuous actions as BEAR and DBR take it.
+#pragma once
+
+#include "learner/objectives/continuous_losses.h"
+#include "learner/objectives/sampled_actions.h"
+#include "learner/training/trained_network.h"
+#include "learner/training/twin_critic.h"
+
+namespace dbr {
+
+// Workspaces, reused from batch to batch.
+template <class Scalar>
+class GreatestTarget {
+ public:
+  // [n] the greatest over draws of pi', the policy's target, of min_weight * min_i Q'_i + (1 - min_weight) *
+  // max_i Q'_i. noise [dimensions x count * n]. No gradient is taken.
+  const VectorX<Scalar>& Compute(const MatrixX<Scalar>& next_observations, const MatrixX<Scalar>& noise,
+                                 Scalar min_weight, TrainedNetwork<Scalar>* policy,
+                                 TwinCritic<Scalar>* critics) {
+    pi_.Split(policy->ForwardTarget(next_observations), kPolicyLogStd);
+    draws_.DrawActions(pi_, noise);
+    critics->EvaluateTargets(draws_.CriticInput(next_observations));
+    value_.resize(next_observations.cols());
+    GreatestTargetValue<Scalar>(critics->target1(), critics->target2(), min_weight, &value_);
+    return value_;
+  }
+
+  const GaussianHead<Scalar>& pi() const { return pi_; }  // pi' at the newest next_observations
+
+ private:
+  GaussianHead<Scalar> pi_;
+  SampledActions<Scalar> draws_;
+  VectorX<Scalar> value_;
+};
+
+}  // namespace dbr

@@ -1,0 +1,53 @@
+// The part of a policy's loss over continuous actions that looks at Q and at the entropy, with its gradient.
+#pragma once
+
+#include "learner/objectives/continuous_losses.h"
+#include "learner/objectives/sampled_actions.h"
+#include "learner/objectives/soft_policy_loss.h"
+#include "learner/training/twin_critic.h"
+
+namespace dbr {
+
+template <class Scalar>
+struct SampledQOptions {
+  QTermOptions q = {};
+  Scalar entropy_weight = 0;
+};
+
+// pi at n states, and the noise of `count` draws of each.
+template <class Scalar>
+struct PolicyDraws {
+  const GaussianHead<Scalar>& pi;
+  const MatrixX<Scalar>& observations;  // [observation x n]
+  const MatrixX<Scalar>& noise;         // [dimensions x count * n], draw k of state j in column k * n + j
+};
+
+// Workspaces, reused from batch to batch.
+template <class Scalar>
+class SampledQObjective {
+ public:
+  // -E[min_i mean_k Q_i(s, a_k)] / scale - entropy_weight * H(pi), the a_k drawn from pi and the entropy that
+  // of the draws, and its gradient with respect to pi's parameters, which is overwritten. The critics'
+  // weights, the entropy's and the scale (SmallerMeanQTerm) are constants.
+  SoftPolicyLoss<Scalar> Compute(const SampledQOptions<Scalar>& options, const PolicyDraws<Scalar>& at,
+                                 TwinCritic<Scalar>* critics, GaussianGradient<Scalar>* gradient) {
+    const Eigen::Index n = at.observations.cols();
+    draws_.Draw(at.pi, at.noise);
+    critics->Evaluate(draws_.CriticInput(at.observations));
+    SmallerMeanQTerm<Scalar>(options.q, critics->value1(), critics->value2(), n, &q_term_);
+    const VectorX<Scalar>& log_prob = draws_.sample().log_prob;
+    d_log_prob_.setConstant(log_prob.size(), options.entropy_weight / static_cast<Scalar>(log_prob.size()));
+    gradient->mean.setZero(at.noise.rows(), n);
+    gradient->log_std.setZero(at.noise.rows(), n);
+    draws_.Backprop(critics->InputGradient(q_term_.d_q1, q_term_.d_q2), d_log_prob_, gradient);
+    const Scalar entropy = -log_prob.mean();
+    return {q_term_.loss - options.entropy_weight * entropy, q_term_.value, entropy};
+  }
+
+ private:
+  SampledActions<Scalar> draws_;
+  QTerm<Scalar> q_term_;
+  VectorX<Scalar> d_log_prob_;
+};
+
+}  // namespace dbr

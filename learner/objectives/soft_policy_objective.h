@@ -1,0 +1,31 @@
+// SAC's policy loss with its gradient.
+#pragma once
+
+#include "learner/objectives/sampled_q_objective.h"
+#include "learner/objectives/soft_policy_loss.h"
+#include "learner/training/twin_critic.h"
+
+namespace dbr {
+
+// Workspaces, reused from batch to batch.
+template <class Scalar>
+class SoftPolicyObjective {
+ public:
+  // E[temperature * log pi(a|s) - min_i Q_i(s, a)], one a drawn from pi for each state by noise [dimensions x
+  // n] (Haarnoja et al. 2018, equation 9), and its gradient with respect to the output of pi's network [2 *
+  // dimensions x n]. The critics' weights and the temperature are constants.
+  SoftPolicyLoss<Scalar> Compute(const GaussianHead<Scalar>& pi, const MatrixX<Scalar>& observations,
+                                 const MatrixX<Scalar>& noise, Scalar temperature,
+                                 TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output) {
+    const SoftPolicyLoss<Scalar> loss =
+        q_objective_.Compute({.entropy_weight = temperature}, {pi, observations, noise}, critics, &gradient_);
+    pi.Join(gradient_, d_output);
+    return loss;
+  }
+
+ private:
+  SampledQObjective<Scalar> q_objective_;
+  GaussianGradient<Scalar> gradient_;
+};
+
+}  // namespace dbr

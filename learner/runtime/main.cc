@@ -1,0 +1,176 @@
+// dbr-learner: trains an algorithm from a replay server and serves its policy.
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "absl/synchronization/notification.h"
+#include "absl/time/clock.h"
+#include "core/run_folder.h"
+#include "core/shutdown.h"
+#include "core/status_macros.h"
+#include "envs/env.h"
+#include "learner/runtime/checkpoints.h"
+#include "learner/runtime/policy_service.h"
+#include "learner/runtime/rollout_reporter.h"
+#include "learner/runtime/trainer.h"
+#include "nn/blas_setup.h"
+#include "proto/config_file.h"
+#include "proto/server.h"
+#include "proto/service_main.h"
+#include "replay/client/await_stats.h"
+
+namespace dbr {
+namespace {
+
+constexpr absl::Duration kMetricsFlush = absl::Seconds(2);
+constexpr absl::Duration kRolloutPeriod = absl::Seconds(5);
+
+struct Arguments : ServiceArguments {
+  std::string replay_address;
+};
+
+absl::StatusOr<AlgorithmSpec> MakeSpec(const Config& config) {
+  ASSIGN_OR_RETURN(
+      const std::unique_ptr<Env> env,
+      MakeEnv({.name = config.env().name(),
+               .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
+  return AlgorithmSpec{.env = env->spec().name,
+                       .observation_size = env->spec().observation_size,
+                       .actions = env->spec().actions,
+                       .hidden_sizes = HiddenSizes(config),
+                       .normalize_observations = config.network().normalize_observations(),
+                       .config = config.algorithm(),
+                       .seed = config.seed()};
+}
+
+// Loads the newest whole checkpoint; one that is missing altogether is a start from nothing.
+absl::Status Resume(const RunFolder& folder, const LearnerConfig& config, Trainer* trainer) {
+  const absl::StatusOr<Checkpoints::Loaded> loaded =
+      Checkpoints(folder.checkpoints(), static_cast<int>(config.keep_checkpoints())).LoadNewest();
+  if (absl::IsNotFound(loaded.status())) {
+    spdlog::warn("{}: training starts from nothing", std::string(loaded.status().message()));
+    return absl::OkStatus();
+  }
+  RETURN_IF_ERROR(loaded.status());
+  for (const std::string& refused : loaded->refused)
+    spdlog::warn("refused a damaged checkpoint: {}", refused);
+  if (const absl::Status status = trainer->Load(loaded->file); !status.ok()) {
+    return absl::Status(status.code(), absl::StrCat("cannot resume from ", loaded->path, ": ",
+                                                    std::string(status.message())));
+  }
+  spdlog::info("resumed from {} at update {}", loaded->path, trainer->updates());
+  return absl::OkStatus();
+}
+
+// Labels that the replay has may be newer than what `trainer` goes on from, and it refuses older ones: no
+// training before it has told of them. Blocks until then, or until a signal has stopped the trainer.
+absl::Status ContinueVersions(ReplayClient* replay, Trainer* trainer) {
+  absl::Notification stopping;
+  const ShutdownWatcher watcher([&] {
+    if (!stopping.HasBeenNotified()) stopping.Notify();
+    trainer->Stop();
+  });
+  const absl::StatusOr<StatsReply> stats = AwaitStats(replay, "to hear of its newest labels", stopping);
+  if (stopping.HasBeenNotified()) return absl::OkStatus();
+  RETURN_IF_ERROR(stats.status());
+  trainer->StartVersionsAfter(stats->newest_critic_version());
+  return absl::OkStatus();
+}
+
+void WriteEvaluation(const EvaluationReport& report, MetricsSink* metrics) {
+  const std::string against = report.opponent().empty() ? "" : absl::StrCat("/", report.opponent());
+  Scalars scalars = {{absl::StrCat(tags::kEvaluationReturn, against), report.return_mean()}};
+  if (std::isfinite(report.score_mean())) {
+    scalars.emplace_back(absl::StrCat(tags::kEvaluationScore, against), report.score_mean());
+  }
+  const absl::Status status =
+      metrics->Write(static_cast<std::int64_t>(report.updates()), absl::Now(), scalars);
+  if (!status.ok()) spdlog::error("metrics: {}", std::string(status.message()));
+}
+
+absl::Status Serve(const Arguments& arguments, const Config& config) {
+  const LearnerConfig& learner = config.learner();
+  ASSIGN_OR_RETURN(const AlgorithmSpec spec, MakeSpec(config));
+  ASSIGN_OR_RETURN(std::unique_ptr<Algorithm> algorithm, MakeAlgorithm(spec));
+  ASSIGN_OR_RETURN(const std::unique_ptr<MetricsSink> metrics,
+                   MetricsSink::Open(arguments.folder, kMetricsFlush, absl::Now()));
+  PolicyService service([&](const EvaluationReport& report) { WriteEvaluation(report, metrics.get()); });
+  Saver saver(arguments.folder, static_cast<int>(learner.keep_checkpoints()));
+  ReplayClient draws(arguments.replay_address), labels(arguments.replay_address),
+      stats(arguments.replay_address);
+  const BatchNeeds needs = algorithm->needs();
+  const TransitionLayout layout{spec.observation_size, spec.actions.width(), spec.actions.mask_width(),
+                                NeedsReturns(config.algorithm()) ? 1 : 0};
+  TrainerParts parts{.algorithm = std::move(algorithm),
+                     .policy_service = &service,
+                     .metrics = metrics.get(),
+                     .saver = &saver,
+                     .prefetcher = nullptr,
+                     .relabeller = std::make_unique<Relabeller>(&labels)};
+  parts.prefetcher = std::make_unique<Prefetcher>(
+      &draws, PrefetcherOptions{.counts = {needs.uniform, needs.plus, needs.minus},
+                                .layout = layout,
+                                .depth = static_cast<int>(learner.prefetch())});
+  Trainer trainer(learner, std::move(parts));
+  if (arguments.resume) RETURN_IF_ERROR(Resume(arguments.folder, learner, &trainer));
+  RETURN_IF_ERROR(ContinueVersions(&stats, &trainer));
+  ASSIGN_OR_RETURN(
+      const RunningServer running,
+      StartServer({arguments.address, arguments.allow_insecure || learner.allow_insecure()}, {&service}));
+  spdlog::info("listening on {}", running.address);
+  absl::Status status;
+  {
+    const RolloutReporter reporter(&stats, metrics.get(), kRolloutPeriod);
+    const ShutdownWatcher watcher([&] { trainer.Stop(); });
+    status = trainer.Run();
+  }
+  service.Close();
+  running.server->Shutdown(absl::ToChronoTime(absl::Now() + absl::Seconds(1)));
+  status.Update(metrics->Flush());
+  return status;
+}
+
+int Main(int argc, char** argv) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("learner"));
+  CLI::App app("Trains an algorithm from a replay server and serves its policy.", "dbr-learner");
+  Arguments arguments;
+  AddServiceFlags("Folder of the run: checkpoints, policy, metrics",
+                  "Continue from the newest checkpoint of the run folder", &arguments, &app);
+  app.add_option("--replay", arguments.replay_address,
+                 "Address of the replay server (default: the config's, else in the run folder)");
+  app.footer("Example: dbr-learner --config deploy/configs/connect4.textproto --run-dir runs/mine");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  const absl::StatusOr<Config> config = LoadConfig(arguments.config_path);
+  if (!config.ok()) {
+    spdlog::error("{}", std::string(config.status().message()));
+    return 2;
+  }
+  std::error_code error;
+  std::filesystem::create_directories(arguments.folder.root, error);
+  const RunFolder& folder = arguments.folder;
+  arguments.replay_address =
+      ChooseAddress(arguments.replay_address, config->replay().address(), folder.replay_address());
+  arguments.address = ChooseAddress(arguments.address, config->learner().address(), folder.learner_address());
+  if (const absl::Status status = Serve(arguments, *config); !status.ok()) {
+    spdlog::error("{}", std::string(status.message()));
+    return absl::IsInvalidArgument(status) ? 2 : 1;
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace dbr
+
+int main(int argc, char** argv) {
+  dbr::RestartWithBlasSetUp(argv);
+  dbr::BlockShutdownSignals();
+  return dbr::Main(argc, argv);
+}

@@ -1,0 +1,98 @@
+#include "learner/runtime/policy_service.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/cleanup/cleanup.h"
+#include "absl/time/time.h"
+#include "proto/codec.h"
+
+namespace dbr {
+namespace {
+// How often a subscription without news looks whether its reader is still there.
+constexpr absl::Duration kLivenessCheck = absl::Seconds(1);
+}  // namespace
+
+PolicyService::PolicyService(std::function<void(const EvaluationReport&)> on_evaluation)
+    : on_evaluation_(std::move(on_evaluation)) {}
+
+void PolicyService::Publish(const PolicySnapshot& snapshot) {
+  auto message = std::make_shared<const PolicyMessage>(Encode(snapshot));
+  absl::MutexLock lock(&mutex_);
+  newest_ = std::move(message);
+}
+
+void PolicyService::SetStatus(LearnerStatus status) {
+  absl::MutexLock lock(&mutex_);
+  status_ = std::move(status);
+}
+
+void PolicyService::Close() {
+  absl::MutexLock lock(&mutex_);
+  closed_ = true;
+}
+
+std::shared_ptr<const PolicyMessage> PolicyService::WaitForOther(std::uint64_t have, absl::Duration timeout) {
+  const auto ready = [this, have]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
+    return closed_ || (newest_ != nullptr && newest_->version() != have);
+  };
+  absl::MutexLock lock(&mutex_);
+  if (!mutex_.AwaitWithTimeout(absl::Condition(&ready), timeout) || closed_) return nullptr;
+  return newest_;
+}
+
+grpc::Status PolicyService::Subscribe(grpc::ServerContext* context, const SubscribeRequest* request,
+                                      grpc::ServerWriter<PolicyMessage>* writer) {
+  std::uint64_t have = request->have_version(), subscription = 0;
+  {
+    absl::MutexLock lock(&mutex_);
+    subscription = next_subscription_++;
+    sent_versions_[subscription] = have;
+  }
+  const absl::Cleanup forget = [&] {
+    absl::MutexLock lock(&mutex_);
+    sent_versions_.erase(subscription);
+  };
+  for (;;) {
+    const std::shared_ptr<const PolicyMessage> message = WaitForOther(have, kLivenessCheck);
+    if (context->IsCancelled()) return grpc::Status::CANCELLED;
+    absl::ReleasableMutexLock lock(&mutex_);
+    if (closed_) return grpc::Status(grpc::StatusCode::UNAVAILABLE, "the learner is stopping");
+    lock.Release();
+    if (message == nullptr) continue;
+    if (!writer->Write(*message)) return grpc::Status::CANCELLED;
+    have = message->version();
+    absl::MutexLock relock(&mutex_);
+    sent_versions_[subscription] = have;
+  }
+}
+
+grpc::Status PolicyService::Status(grpc::ServerContext*, const LearnerStatusRequest*, LearnerStatus* reply) {
+  absl::MutexLock lock(&mutex_);
+  *reply = status_;
+  for (const auto& [opponent, report] : evaluations_) *reply->add_evaluations() = report;
+  reply->mutable_skipped_iterations()->Assign(skipped_iterations_.begin(), skipped_iterations_.end());
+  reply->set_subscribers(static_cast<std::uint32_t>(sent_versions_.size()));
+  std::uint64_t oldest = reply->policy_version();
+  for (const auto& [subscription, version] : sent_versions_) oldest = std::min(oldest, version);
+  reply->set_oldest_subscriber_version(oldest);
+  return grpc::Status::OK;
+}
+
+grpc::Status PolicyService::ReportEvaluation(grpc::ServerContext*, const EvaluationReport* report,
+                                             EvaluationReportReply*) {
+  if (report->episodes() == 0 || !std::isfinite(report->return_mean())) {
+    return grpc::Status(grpc::StatusCode::INVALID_ARGUMENT,
+                        "an evaluation needs episodes above 0 and a finite return_mean");
+  }
+  {
+    absl::MutexLock lock(&mutex_);
+    evaluations_[report->opponent()] = *report;
+    skipped_iterations_.insert(report->skipped_iterations().begin(), report->skipped_iterations().end());
+  }
+  on_evaluation_(*report);
+  return grpc::Status::OK;
+}
+
+}  // namespace dbr

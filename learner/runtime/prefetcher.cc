@@ -1,0 +1,92 @@
+#include "learner/runtime/prefetcher.h"
+
+#include <spdlog/spdlog.h>
+
+#include <string>
+#include <utility>
+
+namespace dbr {
+
+Prefetcher::Prefetcher(ReplayClient* client, const PrefetcherOptions& options)
+    : client_(client),
+      options_(options),
+      ready_(static_cast<std::size_t>(options.depth)),
+      free_(static_cast<std::size_t>(options.depth) + 2),
+      thread_([this] { Run(); }) {}
+
+Prefetcher::~Prefetcher() {
+  Close();
+  thread_.join();
+}
+
+void Prefetcher::Close() {
+  {
+    absl::MutexLock lock(&mutex_);
+    closed_ = true;
+  }
+  client_->Close();
+  ready_.Close();
+  free_.Close();
+}
+
+absl::StatusOr<std::unique_ptr<DrawnBatches>> Prefetcher::Next() {
+  const bool waits = ready_.size() == 0;
+  {
+    absl::MutexLock lock(&mutex_);
+    ++asked_;
+    if (waits) ++waited_;
+  }
+  std::optional<std::unique_ptr<DrawnBatches>> batches = ready_.Pop();
+  if (batches.has_value()) return *std::move(batches);
+  absl::MutexLock lock(&mutex_);
+  return final_.ok() ? absl::CancelledError("the prefetcher is closed") : final_;
+}
+
+void Prefetcher::Recycle(std::unique_ptr<DrawnBatches> batches) {
+  free_.TryPush(std::move(batches));
+}
+
+double Prefetcher::starved_share() const {
+  absl::MutexLock lock(&mutex_);
+  return asked_ == 0 ? 0 : static_cast<double>(waited_) / static_cast<double>(asked_);
+}
+
+void Prefetcher::Run() {
+  bool away = false;
+  std::unique_ptr<DrawnBatches> batches;
+  for (;;) {
+    if (batches == nullptr)
+      batches = free_.Pop(absl::ZeroDuration()).value_or(std::make_unique<DrawnBatches>());
+    const absl::Status status =
+        client_->Sample(options_.counts, options_.layout, options_.call_timeout, batches.get());
+    if (!status.ok()) {
+      if (!HandleFailure(status, &away)) break;
+      continue;
+    }
+    if (std::exchange(away, false)) spdlog::info("the replay server is back");
+    if (!ready_.Push(std::move(batches))) break;
+  }
+  ready_.Close();
+}
+
+bool Prefetcher::HandleFailure(const absl::Status& status, bool* away) {
+  absl::MutexLock lock(&mutex_);
+  if (closed_) return false;
+  switch (status.code()) {
+    case absl::StatusCode::kDeadlineExceeded:  // the rate limiter holds the draw
+      return true;
+    case absl::StatusCode::kUnavailable:
+    case absl::StatusCode::kCancelled:
+    case absl::StatusCode::kUnknown:
+      if (!std::exchange(*away, true)) {
+        spdlog::warn("the replay server is away, trying again: {}", std::string(status.message()));
+      }
+      mutex_.AwaitWithTimeout(absl::Condition(this, &Prefetcher::Closed), options_.retry_after);
+      return !closed_;
+    default:
+      final_ = status;
+      return false;
+  }
+}
+
+}  // namespace dbr

@@ -1,0 +1,45 @@
+#include "learner/runtime/saver.h"
+
+#include <spdlog/spdlog.h>
+
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "core/status_macros.h"
+
+namespace dbr {
+
+Saver::Saver(const RunFolder& folder, int keep)
+    : folder_(folder), checkpoints_(folder.checkpoints(), keep), queue_(1), thread_([this] { Run(); }) {
+  std::error_code error;
+  std::filesystem::create_directories(folder_.policies(), error);
+}
+
+Saver::~Saver() {
+  queue_.Close();
+  thread_.join();
+}
+
+bool Saver::Offer(Checkpoint checkpoint) {
+  return queue_.TryPush(std::move(checkpoint));
+}
+
+absl::Status Saver::SaveNow(const Checkpoint& checkpoint) {
+  absl::MutexLock lock(&writing_);
+  if (checkpoint.updates < written_) return absl::OkStatus();
+  RETURN_IF_ERROR(checkpoints_.Save(checkpoint.updates, checkpoint.state));
+  RETURN_IF_ERROR(SavePolicy(checkpoint.policy, folder_.latest_policy()));
+  written_ = checkpoint.updates;
+  return absl::OkStatus();
+}
+
+void Saver::Run() {
+  while (std::optional<Checkpoint> checkpoint = queue_.Pop()) {
+    if (const absl::Status status = SaveNow(*checkpoint); !status.ok()) {
+      spdlog::error("no checkpoint at update {}: {}", checkpoint->updates, std::string(status.message()));
+    }
+  }
+}
+
+}  // namespace dbr

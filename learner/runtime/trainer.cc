@@ -1,0 +1,126 @@
+#include "learner/runtime/trainer.h"
+
+#include <spdlog/spdlog.h>
+
+#include <string>
+#include <utility>
+
+#include "absl/time/clock.h"
+#include "core/status_macros.h"
+#include "learner/training/tensor_state.h"
+
+namespace dbr {
+namespace {
+constexpr char kUpdates[] = "learner.updates";
+constexpr char kVersion[] = "learner.policy_version";
+}  // namespace
+
+Trainer::Trainer(const LearnerConfig& config, TrainerParts parts)
+    : config_(config), parts_(std::move(parts)) {}
+
+absl::Status Trainer::Load(const TensorFile& file) {
+  RETURN_IF_ERROR(parts_.algorithm->Load(file));
+  RETURN_IF_ERROR(GetCounter(kUpdates, file, &updates_));
+  return GetCounter(kVersion, file, &snapshot_.version);
+}
+
+absl::Status Trainer::Run() {
+  last_record_ = last_checkpoint_ = absl::Now();
+  updates_at_record_ = updates_;
+  Publish();
+  absl::Status status;
+  while (status.ok() && (config_.max_updates() == 0 || updates_ < config_.max_updates()))
+    status = UpdateOnce();
+  const bool stopped = absl::IsCancelled(status);
+  if (!status.ok() && !stopped) return status;  // the state may be worthless: the checkpoints before it stay
+  Publish();
+  RETURN_IF_ERROR(parts_.saver->SaveNow(MakeCheckpoint()));
+  spdlog::info("saved at update {}", updates_);
+  if (!stopped) {
+    SetStatus(/*finished=*/true);
+    absl::MutexLock lock(&mutex_);
+    mutex_.Await(absl::Condition(&stopping_));
+  }
+  return absl::OkStatus();
+}
+
+void Trainer::Stop() {
+  parts_.prefetcher->Close();
+  absl::MutexLock lock(&mutex_);
+  stopping_ = true;
+}
+
+absl::Status Trainer::UpdateOnce() {
+  ASSIGN_OR_RETURN(std::unique_ptr<DrawnBatches> drawn, parts_.prefetcher->Next());
+  RETURN_IF_ERROR(parts_.algorithm->Update({drawn->uniform, drawn->plus, drawn->minus}));
+  parts_.relabeller->Offer(snapshot_.version, drawn->uniform.keys, parts_.algorithm->advantages());
+  parts_.prefetcher->Recycle(std::move(drawn));
+  ++updates_;
+  if (updates_ % config_.push_every() == 0) Publish();
+  if (updates_ % config_.metrics_every() == 0) Record();
+  MaybeCheckpoint();
+  return absl::OkStatus();
+}
+
+void Trainer::Publish() {
+  parts_.algorithm->ExportPolicy(&snapshot_);
+  ++snapshot_.version;
+  snapshot_.updates = updates_;
+  parts_.policy_service->Publish(snapshot_);
+  SetStatus(/*finished=*/false);
+}
+
+void Trainer::SetStatus(bool finished) {
+  LearnerStatus status;
+  status.set_updates(updates_);
+  status.set_policy_version(snapshot_.version);
+  const double seconds = absl::ToDoubleSeconds(absl::Now() - last_record_);
+  const double since_record = static_cast<double>(updates_ - updates_at_record_);
+  status.set_updates_per_second(seconds > 1 ? since_record / seconds : updates_per_second_);
+  status.set_finished(finished);
+  for (const UpdateMetric& metric : parts_.algorithm->metrics()) {
+    Metric* entry = status.add_metrics();
+    entry->set_name(metric.name);
+    entry->set_value(metric.value);
+  }
+  parts_.policy_service->SetStatus(std::move(status));
+}
+
+void Trainer::Record() {
+  const absl::Time now = absl::Now();
+  updates_per_second_ =
+      static_cast<double>(updates_ - updates_at_record_) / absl::ToDoubleSeconds(now - last_record_);
+  last_record_ = now;
+  updates_at_record_ = updates_;
+  Scalars scalars = {{tags::kUpdates, static_cast<double>(updates_)},
+                     {"time/updates_per_second", updates_per_second_},
+                     {"learner/starved_share", parts_.prefetcher->starved_share()},
+                     {"learner/labels_dropped", static_cast<double>(parts_.relabeller->dropped())}};
+  for (const UpdateMetric& metric : parts_.algorithm->metrics())
+    scalars.emplace_back(metric.name, metric.value);
+  if (const absl::Status status = parts_.metrics->Write(static_cast<std::int64_t>(updates_), now, scalars);
+      !status.ok()) {
+    spdlog::error("metrics: {}", std::string(status.message()));
+  }
+}
+
+void Trainer::MaybeCheckpoint() {
+  const absl::Time now = absl::Now();
+  if (now - last_checkpoint_ < absl::Seconds(config_.checkpoint_every_s())) return;
+  last_checkpoint_ = now;
+  parts_.saver->Offer(MakeCheckpoint());
+}
+
+Checkpoint Trainer::MakeCheckpoint() {
+  Checkpoint checkpoint;
+  checkpoint.updates = updates_;
+  parts_.algorithm->Save(&checkpoint.state);
+  PutCounter(kUpdates, updates_, &checkpoint.state);
+  PutCounter(kVersion, snapshot_.version, &checkpoint.state);
+  parts_.algorithm->ExportPolicy(&checkpoint.policy);
+  checkpoint.policy.version = snapshot_.version;
+  checkpoint.policy.updates = updates_;
+  return checkpoint;
+}
+
+}  // namespace dbr

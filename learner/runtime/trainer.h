@@ -1,0 +1,72 @@
+// The learner's main loop: draw, update, write advantages back, push the policy, save.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+
+#include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
+#include "absl/synchronization/mutex.h"
+#include "absl/time/time.h"
+#include "core/run_folder.h"
+#include "learner/algorithm.h"
+#include "learner/metrics/metrics_sink.h"
+#include "learner/runtime/policy_service.h"
+#include "learner/runtime/prefetcher.h"
+#include "learner/runtime/relabeller.h"
+#include "learner/runtime/saver.h"
+#include "proto/config.pb.h"
+
+namespace dbr {
+
+struct TrainerParts {
+  std::unique_ptr<Algorithm> algorithm;
+  PolicyService* policy_service = nullptr;  // outlives the trainer, as the two below
+  MetricsSink* metrics = nullptr;
+  Saver* saver = nullptr;
+  std::unique_ptr<Prefetcher> prefetcher;
+  std::unique_ptr<Relabeller> relabeller;
+};
+
+// Run() in one thread; Stop() from any.
+class Trainer {
+ public:
+  Trainer(const LearnerConfig& config, TrainerParts parts);
+
+  // Continues from a checkpoint that Save() made.
+  absl::Status Load(const TensorFile& file);
+
+  // Versions will be greater than `version`: labels of a learner that went on after its last checkpoint, and
+  // was then killed, carry versions that this one would use again, and the replay refuses what is older than
+  // a label it has.
+  void StartVersionsAfter(std::uint64_t version) { snapshot_.version = std::max(snapshot_.version, version); }
+
+  // Publishes the first policy, then updates until stopped, an error, or max_updates; saves at the end. After
+  // max_updates it goes on serving until Stop. OK after Stop.
+  absl::Status Run();
+  void Stop();
+
+  std::uint64_t updates() const { return updates_; }
+
+ private:
+  absl::Status UpdateOnce();
+  void Publish();
+  void Record();
+  void MaybeCheckpoint();
+  Checkpoint MakeCheckpoint();
+  void SetStatus(bool finished);
+
+  const LearnerConfig config_;
+  TrainerParts parts_;
+  PolicySnapshot snapshot_;
+  std::uint64_t updates_ = 0;
+  std::uint64_t updates_at_record_ = 0;
+  double updates_per_second_ = 0;
+  absl::Time last_record_;
+  absl::Time last_checkpoint_;
+  absl::Mutex mutex_;
+  bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
+};
+
+}  // namespace dbr

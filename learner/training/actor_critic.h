@@ -1,0 +1,88 @@
+// What every actor-critic trains and keeps, whatever its losses: policy, twin critics, random generator,
+// counter, and the advantages of its newest update. Algorithms hold one of these, or one that adds networks.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/rng.h"
+#include "learner/algorithm.h"
+#include "learner/training/learning_rate.h"
+#include "learner/training/pair_runner.h"
+#include "learner/training/policy_export.h"
+#include "learner/training/tensor_state.h"
+#include "learner/training/trained_network.h"
+#include "learner/training/twin_critic.h"
+#include "nn/policy_networks.h"
+
+namespace dbr {
+
+// One thread at a time, but for what runs on `runner`.
+template <class Scalar>
+struct ActorCritic {
+  ActorCritic(const AlgorithmSpec& algorithm_spec, bool policy_target)
+      : spec(algorithm_spec),
+        rng(spec.seed),
+        runner(UpdateThreads(spec.config)),
+        policy(PolicyShape(PolicySpecOf(spec)), spec.config.learning_rate(), policy_target, rng),
+        critics(CriticShape(PolicySpecOf(spec)), spec.config.learning_rate(), rng, &runner) {}
+
+  // All of a batch is drawn from D.
+  BatchNeeds needs() const { return {.uniform = static_cast<int>(spec.config.batch_size())}; }
+
+  // Sets the learning rate of this update, and gives it for networks that are not here.
+  double Begin() {
+    const double learning_rate = LearningRate(spec.config, updates);
+    policy.set_learning_rate(learning_rate);
+    critics.set_learning_rate(learning_rate);
+    return learning_rate;
+  }
+
+  // `advantage`, of each transition of the uniform batch [n], an expression of Eigen's.
+  template <class Vector>
+  void SetAdvantages(const Eigen::MatrixBase<Vector>& advantage) {
+    advantages.resize(static_cast<std::size_t>(advantage.size()));
+    Eigen::Map<Eigen::VectorXf>(advantages.data(), advantage.size()) = advantage.template cast<float>();
+  }
+
+  // Polyak averaging of the critics' targets, and of the policy's where it has one.
+  void UpdateTargets() {
+    critics.UpdateTargets(spec.config.target_tau());
+    policy.UpdateTarget(spec.config.target_tau());
+  }
+
+  // Begins a snapshot with the three networks; an algorithm adds those of its own.
+  void Export(PolicySnapshot* snapshot) const {
+    BeginExport(spec, snapshot);
+    ExportNetwork(kPolicyNetwork, policy.parameters(), snapshot);
+    ExportNetwork(kCritic1, critics.first().parameters(), snapshot);
+    ExportNetwork(kCritic2, critics.second().parameters(), snapshot);
+  }
+
+  void Save(TensorFile* file) const {
+    policy.Save(kPolicyNetwork, file);
+    critics.Save(file);
+    PutRng(AlgorithmName(spec.config) + ".rng", rng, file);
+    PutCounter(AlgorithmName(spec.config) + ".updates", updates, file);
+  }
+  // Errors as TrainedNetwork::Load's.
+  absl::Status Load(const TensorFile& file) {
+    absl::Status status = policy.Load(kPolicyNetwork, file);
+    status.Update(critics.Load(file));
+    status.Update(GetRng(AlgorithmName(spec.config) + ".rng", file, &rng));
+    status.Update(GetCounter(AlgorithmName(spec.config) + ".updates", file, &updates));
+    return status;
+  }
+
+  const AlgorithmSpec spec;
+  Rng rng;
+  PairRunner runner;
+  TrainedNetwork<Scalar> policy;
+  TwinCritic<Scalar> critics;
+  std::uint64_t updates = 0;
+  std::vector<float> advantages;  // of the newest update's uniform batch
+};
+
+}  // namespace dbr

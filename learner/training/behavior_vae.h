@@ -1,0 +1,63 @@
+// BEAR's behaviour model over continuous actions: a conditional VAE with what training it needs.
+#pragma once
+
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/rng.h"
+#include "learner/training/trained_network.h"
+#include "nn/cvae.h"
+
+namespace dbr {
+
+// One thread at a time.
+template <class Scalar>
+class BehaviorVae {
+ public:
+  BehaviorVae(const CvaeShape& shape, double learning_rate, Rng& rng)
+      : encoder_(shape.encoder, learning_rate, /*with_target=*/false, rng),
+        decoder_(shape.decoder, learning_rate, /*with_target=*/false, rng),
+        cvae_(shape) {}
+
+  const CvaeShape& shape() const { return cvae_.shape(); }
+
+  // One step of both networks on the VAE's loss (nn/cvae.h), which is given as it was before the step.
+  CvaeLoss<Scalar> Fit(const CvaeBatch<Scalar>& batch, Scalar kl_weight) {
+    const CvaeLoss<Scalar> loss = cvae_.Gradient({encoder_.parameters(), decoder_.parameters()}, batch,
+                                                 kl_weight, &encoder_.gradient(), &decoder_.gradient());
+    encoder_.ApplyGradient();
+    decoder_.ApplyGradient();
+    return loss;
+  }
+
+  // [dimensions x n * count] actions before their tanh at n observations: sample i of state s is column
+  // s * count + i. noise [latent x n * count] is standard normal; its entries are clipped to +-limit, which
+  // keeps the latents where the decoder has seen data.
+  const MatrixX<Scalar>& Sample(const MatrixX<Scalar>& observations, const MatrixX<Scalar>& noise,
+                                Scalar limit) {
+    latents_ = noise.cwiseMax(-limit).cwiseMin(limit);
+    return cvae_.Decode(decoder_.parameters(), observations, latents_);
+  }
+
+  void set_learning_rate(double learning_rate) {
+    encoder_.set_learning_rate(learning_rate);
+    decoder_.set_learning_rate(learning_rate);
+  }
+
+  void Save(TensorFile* file) const {
+    encoder_.Save("vae.encoder", file);
+    decoder_.Save("vae.decoder", file);
+  }
+  absl::Status Load(const TensorFile& file) {
+    absl::Status status = encoder_.Load("vae.encoder", file);
+    status.Update(decoder_.Load("vae.decoder", file));
+    return status;
+  }
+
+ private:
+  TrainedNetwork<Scalar> encoder_, decoder_;
+  Cvae<Scalar> cvae_;
+  MatrixX<Scalar> latents_;  // [latent x n * count]
+};
+
+}  // namespace dbr

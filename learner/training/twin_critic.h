@@ -1,0 +1,116 @@
+// Two critics with Polyak targets, each on a thread of its own where the runner has two.
+#pragma once
+
+#include <string>
+
+#include "absl/status/status.h"
+#include "core/policy_snapshot.h"
+#include "learner/training/pair_runner.h"
+#include "learner/training/trained_network.h"
+
+namespace dbr {
+
+// What a critic says is [outputs x n]: a value for each action, or one value where the action is part of the
+// input x [input x n]. One thread at a time.
+template <class Scalar>
+class TwinCritic {
+ public:
+  // `runner` outlives the critics.
+  TwinCritic(const MlpShape& shape, double learning_rate, Rng& rng, PairRunner* runner)
+      : runner_(runner),
+        first_{TrainedNetwork<Scalar>(shape, learning_rate, /*with_target=*/true, rng), {}, {}, {}, 0},
+        second_{TrainedNetwork<Scalar>(shape, learning_rate, /*with_target=*/true, rng), {}, {}, {}, 0} {}
+
+  // Evaluates the targets; their values are target1(), target2() until the next call.
+  void EvaluateTargets(const ConstMatrixRef<Scalar>& x) {
+    runner_->Run([&] { first_.target = &first_.network.ForwardTarget(x); },
+                 [&] { second_.target = &second_.network.ForwardTarget(x); });
+  }
+  const MatrixX<Scalar>& target1() const { return *first_.target; }
+  const MatrixX<Scalar>& target2() const { return *second_.target; }
+
+  // One step of both on loss(q, &d_q), which gives a critic's loss and its gradient with respect to q
+  // [outputs x n] and may run on two threads at once. Keeps the values from before the step in q1(), q2().
+  // The two losses' mean.
+  template <class Loss>
+  Scalar Fit(const ConstMatrixRef<Scalar>& x, const Loss& loss) {
+    const auto fit = [&](Critic* critic) {
+      critic->q = critic->network.Forward(x);
+      critic->loss = loss(critic->q, &critic->d_q);
+      critic->network.Step(x, critic->d_q);
+    };
+    runner_->Run([&] { fit(&first_); }, [&] { fit(&second_); });
+    return (first_.loss + second_.loss) / 2;
+  }
+  const MatrixX<Scalar>& q1() const { return first_.q; }
+  const MatrixX<Scalar>& q2() const { return second_.q; }
+
+  // Evaluates the critics as they are; their values are value1(), value2() until the next call.
+  void Evaluate(const ConstMatrixRef<Scalar>& x) {
+    runner_->Run([&] { first_.value = &first_.network.ForwardForInput(x); },
+                 [&] { second_.value = &second_.network.ForwardForInput(x); });
+  }
+  const MatrixX<Scalar>& value1() const { return *first_.value; }
+  const MatrixX<Scalar>& value2() const { return *second_.value; }
+  // The gradient of sum(d_q1 .* q1 + d_q2 .* q2) with respect to the x [input x n] of the newest Evaluate.
+  const MatrixX<Scalar>& InputGradient(const ConstMatrixRef<Scalar>& d_q1,
+                                       const ConstMatrixRef<Scalar>& d_q2) {
+    runner_->Run([&] { first_.network.InputGradient(d_q1, &first_.d_x); },
+                 [&] { second_.network.InputGradient(d_q2, &second_.d_x); });
+    first_.d_x += second_.d_x;
+    return first_.d_x;
+  }
+  // The gradient of sum(d_q1 .* q1) alone.
+  const MatrixX<Scalar>& FirstInputGradient(const ConstMatrixRef<Scalar>& d_q1) {
+    first_.network.InputGradient(d_q1, &first_.d_x);
+    return first_.d_x;
+  }
+
+  void set_learning_rate(double learning_rate) {
+    first_.network.set_learning_rate(learning_rate);
+    second_.network.set_learning_rate(learning_rate);
+  }
+  void UpdateTargets(double tau) {
+    runner_->Run([&] { first_.network.UpdateTarget(tau); }, [&] { second_.network.UpdateTarget(tau); });
+  }
+  const TrainedNetwork<Scalar>& first() const { return first_.network; }
+  const TrainedNetwork<Scalar>& second() const { return second_.network; }
+
+  void Save(TensorFile* file) const {
+    first_.network.Save(kCritic1, file);
+    second_.network.Save(kCritic2, file);
+  }
+  absl::Status Load(const TensorFile& file) {
+    absl::Status status = first_.network.Load(kCritic1, file);
+    status.Update(second_.network.Load(kCritic2, file));
+    return status;
+  }
+
+  // Useful operations for n samples.
+  double TargetFlops(Eigen::Index n) const { return 2 * shape().ForwardFlops(n); }  // or of Evaluate
+  double FitFlops(Eigen::Index n) const {
+    return 2 * (shape().ForwardFlops(n) + shape().ParameterGradientFlops(n));
+  }
+  // Of Evaluate and InputGradient, where each sample's gradient goes through one of the two.
+  double InputGradientFlops(Eigen::Index n) const { return 3 * shape().ForwardFlops(n); }
+  // Of FirstInputGradient, without Evaluate.
+  double FirstInputGradientFlops(Eigen::Index n) const { return shape().ForwardFlops(n); }
+
+ private:
+  struct Critic {
+    TrainedNetwork<Scalar> network;
+    MatrixX<Scalar> q;    // [outputs x n] of the newest Fit, from before its step
+    MatrixX<Scalar> d_q;  // [outputs x n]
+    MatrixX<Scalar> d_x;  // [input x n]
+    Scalar loss;
+    const MatrixX<Scalar>* target = nullptr;  // [outputs x n] of the newest EvaluateTargets
+    const MatrixX<Scalar>* value = nullptr;   // [outputs x n] of the newest Evaluate
+  };
+
+  const MlpShape& shape() const { return first_.network.shape(); }
+
+  PairRunner* const runner_;
+  Critic first_, second_;
+};
+
+}  // namespace dbr

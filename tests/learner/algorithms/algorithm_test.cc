@@ -1,0 +1,400 @@
+// What every algorithm of the registry must do, and that DBR solves small problems with known answers.
+#include "learner/algorithm.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+
+#include "absl/strings/match.h"
+#include "learner/algorithms/discrete_dbr.h"
+#include "learner/training/learning_rate.h"
+#include "nn/policy.h"
+#include "tests/learner/algorithms/allocation_count.h"
+#include "tests/learner/algorithms/batches.h"
+#include "tests/learner/algorithms/tiny_problem.h"
+
+namespace dbr {
+namespace {
+
+AlgorithmSpec SpecOf(const AlgorithmId& id, std::uint64_t seed = 1) {
+  AlgorithmSpec spec = SmallSpec(seed, id.actions);
+  if (id.name == "sac") spec.config.mutable_sac();
+  if (id.name == "ddqn") spec.config.mutable_ddqn();
+  if (id.name == "sac_discrete") spec.config.mutable_sac_discrete();
+  if (id.name == "bear") {
+    BearConfig* bear = spec.config.mutable_bear();
+    bear->set_warm_start_updates(2);
+    bear->add_vae_hidden_sizes(8);
+  }
+  if (id.name == "brac") spec.config.mutable_brac()->set_variant(BracConfig::VP);
+  if (id.name == "td3") spec.config.mutable_td3();
+  if (id.name == "awac") spec.config.mutable_awac()->set_value_samples(3);
+  EXPECT_EQ(AlgorithmName(spec.config), id.name) << "give the new algorithm its config here";
+  return spec;
+}
+
+// An algorithm with its defaults, or one of its variants.
+struct Member {
+  AlgorithmId id;
+  std::string variant;  // of kVariants; empty: none
+};
+
+struct Variant {
+  const char* name;
+  const char* algorithm;
+  void (*set)(AlgorithmSpec* spec);
+};
+
+constexpr Variant kVariants[] = {
+    {"Sil", "dbr", [](AlgorithmSpec* spec) { spec->config.mutable_dbr()->set_advantage(DbrConfig::SIL); }},
+    {"Mrl", "dbr",
+     [](AlgorithmSpec* spec) {
+       DbrConfig* dbr = spec->config.mutable_dbr();
+       dbr->set_constraint(DbrConfig::NONE);
+       dbr->set_munchausen_weight(0.9);
+       dbr->set_entropy_weight(0.1);
+     }},
+    {"Normalized", "dbr", [](AlgorithmSpec* spec) { spec->normalize_observations = true; }},
+};
+
+AlgorithmSpec SpecOf(const Member& member, std::uint64_t seed = 1) {
+  AlgorithmSpec spec = SpecOf(member.id, seed);
+  for (const Variant& variant : kVariants) {
+    if (member.variant == variant.name) variant.set(&spec);
+  }
+  return spec;
+}
+
+std::vector<Member> Members() {
+  std::vector<Member> members;
+  for (const AlgorithmId& id : Algorithms()) {
+    members.push_back({id, ""});
+    for (const Variant& variant : kVariants) {
+      if (id.name == variant.algorithm) members.push_back({id, variant.name});
+    }
+  }
+  return members;
+}
+
+class Conformance : public testing::TestWithParam<Member> {
+ protected:
+  Conformance() { algorithm_ = Make(1); }
+
+  std::unique_ptr<Algorithm> Make(std::uint64_t seed) {
+    auto algorithm = MakeAlgorithm(SpecOf(GetParam(), seed));
+    EXPECT_TRUE(algorithm.ok()) << algorithm.status();
+    return std::move(algorithm).value();
+  }
+  Batch Random(int n) { return RandomBatch<float>(SpecOf(GetParam()), n, rng_); }
+  static TensorFile StateOf(const Algorithm& algorithm) {
+    TensorFile file;
+    algorithm.Save(&file);
+    return file;
+  }
+  void Update(Algorithm* algorithm, int n = 16) {
+    const Batch uniform = Random(n), plus = Random(n), minus = Random(n);
+    ASSERT_TRUE(algorithm->Update({uniform, plus, minus}).ok());
+  }
+
+  Rng rng_{9};
+  std::unique_ptr<Algorithm> algorithm_;
+};
+
+TEST_P(Conformance, SameSeedAndBatchesGiveTheSameState) {
+  const auto twin = Make(1), other = Make(2);
+  EXPECT_NE(StateOf(*algorithm_).tensors, StateOf(*other).tensors);
+  for (int i = 0; i < 5; ++i) {
+    rng_ = Rng(100 + static_cast<std::uint64_t>(i));
+    Update(algorithm_.get());
+    rng_ = Rng(100 + static_cast<std::uint64_t>(i));
+    Update(twin.get());
+  }
+  EXPECT_EQ(StateOf(*algorithm_).tensors, StateOf(*twin).tensors);
+}
+
+TEST_P(Conformance, SavingAndLoadingContinuesBitForBit) {
+  for (int i = 0; i < 3; ++i) Update(algorithm_.get());
+  const auto loaded = Make(77);
+  ASSERT_TRUE(loaded->Load(StateOf(*algorithm_)).ok());
+  for (Algorithm* algorithm : {algorithm_.get(), loaded.get()}) {
+    rng_ = Rng(5);
+    for (int i = 0; i < 3; ++i) Update(algorithm);
+  }
+  EXPECT_EQ(StateOf(*algorithm_).tensors, StateOf(*loaded).tensors);
+  EXPECT_EQ(StateOf(*algorithm_).metadata, StateOf(*loaded).metadata);
+}
+
+TEST_P(Conformance, LoadingNamesAMissingOrMisshapenTensor) {
+  TensorFile file = StateOf(*algorithm_);
+  const std::string name = file.tensors.begin()->first;
+  file.tensors.begin()->second.pop_back();
+  EXPECT_THAT(std::string(algorithm_->Load(file).message()), testing::HasSubstr(name));
+  file.tensors.erase(file.tensors.begin());
+  EXPECT_THAT(std::string(algorithm_->Load(file).message()), testing::HasSubstr(name));
+}
+
+TEST_P(Conformance, AnUpdateMovesEveryNetworkThatItExports) {
+  PolicySnapshot before, after;
+  algorithm_->ExportPolicy(&before);
+  Update(algorithm_.get());
+  algorithm_->ExportPolicy(&after);
+  ASSERT_EQ(before.networks.size(), after.networks.size());
+  for (std::size_t i = 0; i < before.networks.size(); ++i) {
+    EXPECT_NE(before.networks[i].second, after.networks[i].second) << before.networks[i].first;
+  }
+  EXPECT_TRUE(PolicyNetworks::Create(after).ok());
+}
+
+TEST_P(Conformance, AcceptsABatchOfOneAndEmptyPartitions) {
+  Update(algorithm_.get(), 1);
+  const Batch uniform = Random(4), empty;
+  EXPECT_TRUE(algorithm_->Update({uniform, empty, empty}).ok());
+  EXPECT_EQ(algorithm_->advantages().size(), 4u);
+}
+
+// Makes an action that is illegal everywhere be worth 10^6 in every network: nothing else changes, to the
+// last bit, and no mode plays it.
+TEST_P(Conformance, AnIllegalActionIsNeitherLearnedFromNorChosen) {
+  if (GetParam().id.actions != ActionKind::kDiscrete) GTEST_SKIP() << "every action is legal";
+  constexpr int kIllegal = 2;
+  PolicySnapshot snapshot;
+  algorithm_->ExportPolicy(&snapshot);
+  const std::size_t parameters = snapshot.Find(kPolicyNetwork)->size(), bias = parameters - 3 + kIllegal;
+  const auto set_bias = [&](float value, TensorFile file) {
+    for (auto& [name, tensor] : file.tensors) {
+      if (tensor.size() == parameters && !absl::StrContains(name, ".adam.")) tensor[bias] = value;
+    }
+    return file;
+  };
+  const auto tempted = Make(1);
+  ASSERT_TRUE(tempted->Load(set_bias(1e6f, StateOf(*tempted))).ok());
+  for (int i = 0; i < 3; ++i) {
+    Batch batch = Random(16);
+    batch.masks.row(kIllegal).setZero();
+    batch.next_masks.row(kIllegal).setZero();
+    batch.actions = batch.actions.cwiseMin(1);
+    ASSERT_TRUE(algorithm_->Update({batch, batch, batch}).ok());
+    ASSERT_TRUE(tempted->Update({batch, batch, batch}).ok());
+  }
+  EXPECT_EQ(set_bias(0, StateOf(*tempted)).tensors, set_bias(0, StateOf(*algorithm_)).tensors);
+
+  tempted->ExportPolicy(&snapshot);
+  const auto policy = PolicyNetworks::Create(snapshot);
+  PolicyRunner runner;
+  MatrixX<float> actions(1, 16), masks = MatrixX<float>::Ones(3, 16);
+  masks.row(kIllegal).setZero();
+  for (const ActingMode mode : {SAMPLE, MODE, GREEDY_Q, SUPPORT}) {
+    if (mode == SUPPORT && !(*policy)->has_dual_behavior()) continue;
+    ASSERT_TRUE(runner.Act(**policy, mode, Random(16).observations, masks, rng_, actions).ok());
+    EXPECT_LT(actions.maxCoeff(), kIllegal);
+  }
+}
+
+TEST_P(Conformance, AnUpdateAllocatesNothing) {
+  const Batch uniform = Random(16), plus = Random(16), minus = Random(16);
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(algorithm_->Update({uniform, plus, minus}).ok());
+  if (!CountsAllocations()) GTEST_SKIP() << "allocations belong to the sanitizer in this build";
+  const std::uint64_t before = AllocationCount();
+  const bool ok = algorithm_->Update({uniform, plus, minus}).ok();
+  EXPECT_EQ(AllocationCount() - before, 0u);
+  EXPECT_TRUE(ok);
+}
+
+TEST_P(Conformance, ALossThatIsNotFiniteIsNamed) {
+  Batch uniform = Random(16);
+  const Batch other = Random(16);
+  uniform.rewards[3] = NAN;
+  const absl::Status status = algorithm_->Update({uniform, other, other});
+  EXPECT_TRUE(absl::IsInternal(status));
+  EXPECT_THAT(std::string(status.message()), testing::HasSubstr("critic_loss"));
+}
+
+TEST_P(Conformance, TwoThreadsGiveWhatOneGives) {
+  TensorFile states[2];
+  for (const int threads : {1, 2}) {
+    AlgorithmSpec spec = SpecOf(GetParam());
+    spec.config.set_threads(static_cast<std::uint32_t>(threads));
+    const auto algorithm = MakeAlgorithm(spec);
+    rng_ = Rng(3);
+    for (int i = 0; i < 20; ++i) Update(algorithm->get());
+    (*algorithm)->Save(&states[threads - 1]);
+  }
+  EXPECT_EQ(states[0].tensors, states[1].tensors);
+}
+
+INSTANTIATE_TEST_SUITE_P(Registry, Conformance, testing::ValuesIn(Members()), [](const auto& info) {
+  const AlgorithmId& id = info.param.id;
+  return id.name + (id.actions == ActionKind::kDiscrete ? "Discrete" : "Continuous") + info.param.variant;
+});
+
+TEST(LearningRateTest, FallsLinearlyToItsEndAndStaysThere) {
+  AlgorithmConfig config;
+  config.set_learning_rate(0.1);
+  config.set_final_learning_rate(0.02);
+  EXPECT_EQ(LearningRate(config, 1000), 0.1) << "it never falls";
+  config.set_learning_rate_decay_updates(40);
+  EXPECT_EQ(LearningRate(config, 0), 0.1);
+  EXPECT_NEAR(LearningRate(config, 10), 0.08, 1e-12);
+  EXPECT_NEAR(LearningRate(config, 39), 0.022, 1e-12);
+  EXPECT_EQ(LearningRate(config, 40), 0.02);
+  EXPECT_EQ(LearningRate(config, 1000), 0.02);
+}
+
+// A rate that has fallen to 0 moves nothing more.
+TEST(LearningRateTest, ThatHasFallenTo0MovesNoPolicy) {
+  for (const AlgorithmId& id : Algorithms()) {
+    std::vector<float> policies[2];
+    for (const int decayed : {0, 1}) {
+      AlgorithmSpec spec = SpecOf(id);
+      if (decayed == 1) {
+        spec.config.set_learning_rate_decay_updates(2);
+        spec.config.set_final_learning_rate(0);
+      }
+      const auto algorithm = MakeAlgorithm(spec);
+      ASSERT_TRUE(algorithm.ok()) << algorithm.status();
+      Rng rng(5);
+      PolicySnapshot before, after;
+      for (int i = 0; i < 6; ++i) {
+        const Batch batch = RandomBatch<float>(spec, 16, rng);
+        if (i == 2) (*algorithm)->ExportPolicy(&before);
+        ASSERT_TRUE((*algorithm)->Update({batch, batch, batch}).ok());
+      }
+      (*algorithm)->ExportPolicy(&after);
+      if (decayed == 1) {
+        EXPECT_EQ(*before.Find(kPolicyNetwork), *after.Find(kPolicyNetwork)) << id.name;
+      }
+      policies[decayed] = *after.Find(kPolicyNetwork);
+    }
+    EXPECT_NE(policies[0], policies[1]) << id.name;
+  }
+}
+
+TEST(Registry, RefusesAnActionSpaceThatTheAlgorithmDoesNotServe) {
+  AlgorithmSpec spec = SmallSpec();
+  spec.config.mutable_sac();
+  EXPECT_THAT(
+      std::string(MakeAlgorithm(spec).status().message()),
+      testing::ContainsRegex("serves the discrete actions of environment 'test' \\(dbr.*\\), found sac$"));
+}
+
+TEST(Registry, OverDiscreteActionsAllThreeMmdsAreOne) {
+  TensorFile states[3];
+  for (int i = 0; i < 3; ++i) {
+    AlgorithmSpec spec = SmallSpec();
+    spec.config.mutable_dbr()->set_divergence(
+        std::array{DbrConfig::MMD_EXACT, DbrConfig::MMD_LAPLACIAN, DbrConfig::MMD_GAUSSIAN}[i]);
+    const auto algorithm = MakeAlgorithm(spec);
+    ASSERT_TRUE(algorithm.ok()) << algorithm.status();
+    Rng rng(4);
+    const Batch uniform = RandomBatch<float>(spec, 16, rng), plus = RandomBatch<float>(spec, 16, rng);
+    ASSERT_TRUE((*algorithm)->Update({uniform, plus, plus}).ok());
+    (*algorithm)->Save(&states[i]);
+  }
+  EXPECT_EQ(states[0].tensors, states[1].tensors);
+  EXPECT_EQ(states[0].tensors, states[2].tensors);
+}
+
+// Observations far from 0 and of another scale give, but for rounding, what the same at home gives.
+TEST(Normalized, TheScaleOfObservationsDoesNotMatter) {
+  std::vector<float> policies[2];
+  for (const int variant : {0, 1}) {
+    AlgorithmSpec spec = SmallSpec(1, ActionKind::kContinuous);
+    spec.config.mutable_sac();
+    spec.normalize_observations = true;
+    const auto algorithm = MakeAlgorithm(spec);
+    ASSERT_TRUE(algorithm.ok());
+    Rng rng(3);
+    for (int i = 0; i < 5; ++i) {
+      Batch batch = RandomBatch<float>(spec, 16, rng);
+      if (variant == 1) {
+        batch.observations = (8 * batch.observations.array() + 3).matrix().eval();
+        batch.next_observations = (8 * batch.next_observations.array() + 3).matrix().eval();
+      }
+      ASSERT_TRUE((*algorithm)->Update({batch, batch, batch}).ok());
+    }
+    PolicySnapshot snapshot;
+    (*algorithm)->ExportPolicy(&snapshot);
+    policies[variant] = *snapshot.Find(kPolicyNetwork);
+    const std::vector<float>& statistics = *snapshot.Find(kObservationNormalizer);
+    ASSERT_EQ(statistics.size(), 10u);
+    EXPECT_NEAR(statistics[0], variant == 1 ? 3 : 0,
+                variant == 1 ? 1.6 : 0.2);  // the mean of 80 uniform draws
+    EXPECT_NEAR(statistics[5], std::sqrt(3.0) / (variant == 1 ? 8 : 1), 0.3);
+  }
+  for (std::size_t i = 0; i < policies[0].size(); ++i) EXPECT_NEAR(policies[0][i], policies[1][i], 1e-4);
+}
+
+TEST(Normalized, ActingTakesTheStatisticsAlong) {
+  AlgorithmSpec spec = SmallSpec(1, ActionKind::kContinuous);
+  spec.config.mutable_sac();
+  spec.normalize_observations = true;
+  const auto algorithm = MakeAlgorithm(spec);
+  Rng rng(3);
+  const Batch batch = RandomBatch<float>(spec, 16, rng);
+  ASSERT_TRUE((*algorithm)->Update({batch, batch, batch}).ok());
+  PolicySnapshot with;
+  (*algorithm)->ExportPolicy(&with);
+  PolicySnapshot without = with;
+  without.networks.pop_back();  // the statistics
+  const auto act = [&](const PolicySnapshot& snapshot, const MatrixX<float>& observations) {
+    PolicyRunner runner;
+    MatrixX<float> actions(2, observations.cols());
+    const auto policy = PolicyNetworks::Create(snapshot);
+    EXPECT_TRUE(runner.Act(**policy, MODE, observations, MatrixX<float>(0, 16), rng, actions).ok());
+    return actions;
+  };
+  const std::vector<float>& statistics = *with.Find(kObservationNormalizer);
+  const Eigen::Map<const VectorX<float>> mean(statistics.data(), 5), scale(statistics.data() + 5, 5);
+  const MatrixX<float> by_hand =
+      ((batch.observations.colwise() - mean).array().colwise() * scale.array()).matrix();
+  EXPECT_TRUE(act(with, batch.observations).isApprox(act(without, by_hand), 1e-5f));
+  EXPECT_FALSE(act(with, batch.observations).isApprox(act(without, batch.observations), 1e-3f));
+}
+
+TEST(DiscreteDbr, WarmStartLeavesQOut) {
+  // Policies that differ in their critics' data alone stay equal while Q is left out.
+  std::vector<float> policies[2];
+  for (const int variant : {0, 1}) {
+    AlgorithmSpec spec = SmallSpec();
+    spec.config.mutable_dbr()->set_warm_start_updates(3);
+    DiscreteDbr<float> dbr(spec);
+    Rng rng(3);
+    for (int i = 0; i < 3; ++i) {
+      Batch batch = RandomBatch<float>(spec, 16, rng);
+      const Batch behavior = batch;
+      batch.rewards *= static_cast<float>(1 + 10 * variant);
+      ASSERT_TRUE(dbr.Update(batch, behavior, behavior).ok());
+    }
+    PolicySnapshot snapshot;
+    dbr.ExportPolicy(&snapshot);
+    policies[variant] = *snapshot.Find(kPolicyNetwork);
+  }
+  EXPECT_EQ(policies[0], policies[1]);
+}
+
+using DiscreteDbrTinyProblem = TinyProblem;
+
+TEST_F(DiscreteDbrTinyProblem, TheTwoBehavioursOfABanditSeparate) {
+  Train(Bandit(), 1, 3, 600);
+  EXPECT_GT(view_.policy(1, 0), 0.9f);
+  EXPECT_GT(view_.beta_plus(1, 0), 0.9f);
+  EXPECT_LT(view_.beta_minus(1, 0), 0.2f);
+  EXPECT_NEAR(view_.q(1, 0), 1, 0.05);
+  EXPECT_NEAR(view_.q(0, 0), 0, 0.05);
+}
+
+TEST_F(DiscreteDbrTinyProblem, ATwoStateChainHasItsClosedFormValues) {
+  Train(Chain(), 2, 2, 1500);
+  EXPECT_NEAR(view_.q(0, 1), 1, 0.05);
+  EXPECT_NEAR(view_.q(1, 1), -1, 0.05);
+  EXPECT_NEAR(view_.q(0, 0), 0.9, 0.05);
+  EXPECT_NEAR(view_.q(1, 0), 0.3, 0.05);
+  EXPECT_GT(view_.policy(0, 0), 0.9f);
+  EXPECT_GT(view_.policy(0, 1), 0.9f);
+}
+
+}  // namespace
+}  // namespace dbr

@@ -1,0 +1,60 @@
+#include "tests/learner/algorithms/allocation_count.h"
+
+#include <atomic>
+#include <cerrno>
+#include <cstddef>
+
+namespace dbr {
+namespace {
+std::atomic<std::uint64_t> count{0};
+}  // namespace
+
+std::uint64_t AllocationCount() {
+  return count.load(std::memory_order_relaxed);
+}
+
+}  // namespace dbr
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
+
+bool dbr::CountsAllocations() {
+  return false;
+}
+
+#else
+
+bool dbr::CountsAllocations() {
+  return true;
+}
+
+// glibc's own allocator under its internal names; ours take the public ones.
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* old, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+void* malloc(std::size_t size) {
+  dbr::count.fetch_add(1, std::memory_order_relaxed);
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t n, std::size_t size) {
+  dbr::count.fetch_add(1, std::memory_order_relaxed);
+  return __libc_calloc(n, size);
+}
+void* realloc(void* old, std::size_t size) {
+  dbr::count.fetch_add(1, std::memory_order_relaxed);
+  return __libc_realloc(old, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+  dbr::count.fetch_add(1, std::memory_order_relaxed);
+  return __libc_memalign(alignment, size);
+}
+int posix_memalign(void** memory, std::size_t alignment, std::size_t size) {
+  dbr::count.fetch_add(1, std::memory_order_relaxed);
+  *memory = __libc_memalign(alignment, size);
+  return *memory == nullptr ? ENOMEM : 0;
+}
+}
+
+#endif

@@ -1,0 +1,268 @@
+// BRAC, TD3 and AWAC: what an update touches, and that each solves a bandit whose optimum is known.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "learner/algorithm.h"
+#include "nn/policy.h"
+#include "tests/learner/algorithms/batches.h"
+
+namespace dbr {
+namespace {
+
+AlgorithmSpec BaselineSpec(AlgorithmConfig::AlgorithmCase algorithm) {
+  AlgorithmSpec spec = SmallSpec(1, ActionKind::kContinuous);
+  if (algorithm == AlgorithmConfig::kBrac) spec.config.mutable_brac();
+  if (algorithm == AlgorithmConfig::kTd3) spec.config.mutable_td3();
+  if (algorithm == AlgorithmConfig::kAwac) spec.config.mutable_awac();
+  return spec;
+}
+
+std::unique_ptr<Algorithm> Make(const AlgorithmSpec& spec) {
+  auto algorithm = MakeAlgorithm(spec);
+  EXPECT_TRUE(algorithm.ok()) << algorithm.status();
+  return std::move(algorithm).value();
+}
+
+TensorFile StateOf(const Algorithm& algorithm) {
+  TensorFile file;
+  algorithm.Save(&file);
+  return file;
+}
+
+double Metric(const Algorithm& algorithm, const std::string& name) {
+  for (const UpdateMetric& metric : algorithm.metrics()) {
+    if (metric.name == name) return metric.value;
+  }
+  ADD_FAILURE() << "no metric " << name;
+  return 0;
+}
+
+// `updates` updates on random batches that depend on nothing but their number.
+std::unique_ptr<Algorithm> Trained(const AlgorithmSpec& spec, int updates) {
+  auto algorithm = Make(spec);
+  Rng rng(3);
+  for (int i = 0; i < updates; ++i) {
+    const Batch batch = RandomBatch<float>(spec, 16, rng);
+    EXPECT_TRUE(algorithm->Update({batch, batch, batch}).ok());
+  }
+  return algorithm;
+}
+
+TEST(Brac, ThePolicysStepLeavesTheBehaviourAndTheCriticsAlone) {
+  AlgorithmSpec spec = BaselineSpec(AlgorithmConfig::kBrac);
+  const TensorFile weak = StateOf(*Trained(spec, 1));
+  spec.config.mutable_brac()->set_first_multiplier(100);
+  const TensorFile strong = StateOf(*Trained(spec, 1));
+  EXPECT_NE(weak.tensors.at("policy.adam.first"), strong.tensors.at("policy.adam.first"));
+  for (const char* name : {"behavior", "behavior.adam.first", "critic_1", "critic_1.adam.first",
+                           "critic_1.target", "critic_2", "critic_2.adam.first"}) {
+    EXPECT_EQ(weak.tensors.at(name), strong.tensors.at(name)) << name;
+  }
+}
+
+TEST(Brac, TheValuePenaltyLowersTheTargetInProportionToTheMultiplier) {
+  double target[3];
+  for (const int penalties : {0, 1, 2}) {
+    AlgorithmSpec spec = BaselineSpec(AlgorithmConfig::kBrac);
+    BracConfig* config = spec.config.mutable_brac();
+    config->set_variant(penalties == 0 ? BracConfig::PR : BracConfig::VP);
+    config->set_first_multiplier(std::max(penalties, 1));
+    target[penalties] = Metric(*Trained(spec, 1), "train/target_mean");
+  }
+  EXPECT_NE(target[0], target[1]);
+  EXPECT_NEAR(target[0] - target[2], 2 * (target[0] - target[1]), 1e-5);
+}
+
+TEST(Brac, WarmStartLeavesQOut) {
+  // Policies that differ in their critics' rewards alone stay equal while Q is left out.
+  std::vector<float> policies[2];
+  for (const int variant : {0, 1}) {
+    AlgorithmSpec spec = BaselineSpec(AlgorithmConfig::kBrac);
+    spec.config.set_reward_scale(1 + 9 * variant);
+    spec.config.mutable_brac()->set_warm_start_updates(3);
+    policies[variant] = StateOf(*Trained(spec, 3)).tensors.at("policy");
+  }
+  EXPECT_EQ(policies[0], policies[1]);
+}
+
+TEST(Brac, TheMultiplierMovesOnlyWhereItIsAdaptive) {
+  for (const bool adaptive : {false, true}) {
+    AlgorithmSpec spec = BaselineSpec(AlgorithmConfig::kBrac);
+    spec.config.mutable_brac()->set_adaptive_multiplier(adaptive);
+    spec.config.mutable_brac()->set_epsilon(1000);  // far above any divergence: it must fall
+    const double multiplier = Metric(*Trained(spec, 5), "train/multiplier");
+    if (adaptive) {
+      EXPECT_LT(multiplier, 0.999);
+    } else {
+      EXPECT_EQ(multiplier, 1);
+    }
+  }
+}
+
+TEST(Td3, PolicyAndTargetsMoveEveryDelayedUpdate) {
+  AlgorithmSpec spec = BaselineSpec(AlgorithmConfig::kTd3);
+  spec.config.mutable_td3()->set_policy_delay(3);
+  TensorFile before = StateOf(*Trained(spec, 0));
+  for (int updates = 1; updates <= 7; ++updates) {
+    const TensorFile after = StateOf(*Trained(spec, updates));
+    EXPECT_NE(after.tensors.at("critic_1"), before.tensors.at("critic_1"));
+    for (const char* name : {"policy", "policy.target", "critic_1.target", "critic_2.target"}) {
+      const bool moved = after.tensors.at(name) != before.tensors.at(name);
+      EXPECT_EQ(moved, updates % 3 == 1) << name << " at update " << updates;
+    }
+    before = after;
+  }
+}
+
+TEST(Td3, SamplingGivesTheMode) {
+  AlgorithmSpec spec = BaselineSpec(AlgorithmConfig::kTd3);
+  spec.config.set_learning_rate(0.01);
+  PolicySnapshot snapshot;
+  Trained(spec, 20)->ExportPolicy(&snapshot);
+  const auto policy = PolicyNetworks::Create(snapshot);
+  ASSERT_TRUE(policy.ok());
+  Rng rng(4);
+  const MatrixX<float> observations = RandomBatch<float>(spec, 8, rng).observations;
+  PolicyRunner runner;
+  MatrixX<float> sampled(2, 8), mode(2, 8);
+  const MatrixX<float> no_masks(0, 8);
+  ASSERT_TRUE(runner.Act(**policy, SAMPLE, observations, no_masks, rng, sampled).ok());
+  ASSERT_TRUE(runner.Act(**policy, MODE, observations, no_masks, rng, mode).ok());
+  EXPECT_LT((sampled - mode).cwiseAbs().maxCoeff(), 1e-6f);
+}
+
+TEST(Td3, WithoutNoiseTheTargetIsThatOfTheTargetPolicysAction) {
+  AlgorithmSpec spec = BaselineSpec(AlgorithmConfig::kTd3);
+  const auto target_mean = [&](double noise, double limit) {
+    spec.config.mutable_td3()->set_target_noise(noise);
+    spec.config.mutable_td3()->set_target_noise_limit(limit);
+    return Metric(*Trained(spec, 1), "train/target_mean");
+  };
+  EXPECT_EQ(target_mean(0, 0.5), target_mean(0.2, 0));
+  EXPECT_NE(target_mean(0, 0.5), target_mean(0.2, 0.5));
+}
+
+TEST(Awac, NoWeightPassesItsLimit) {
+  AlgorithmSpec spec = BaselineSpec(AlgorithmConfig::kAwac);
+  spec.config.mutable_awac()->set_temperature(1e-3);
+  spec.config.mutable_awac()->set_max_weight(5);
+  const auto algorithm = Trained(spec, 3);
+  EXPECT_NEAR(Metric(*algorithm, "train/weight_max"), 5, 1e-4);
+  EXPECT_LT(Metric(*algorithm, "train/weight_mean"), 5);
+}
+
+// One state, one step, one dimension; the actions are given, the reward is a function of them.
+class Bandit : public testing::Test {
+ protected:
+  static constexpr int kActions = 32, kUpdates = 1200;
+
+  static AlgorithmSpec Spec(AlgorithmConfig::AlgorithmCase algorithm) {
+    AlgorithmSpec spec = BaselineSpec(algorithm);
+    spec.observation_size = 1;
+    spec.actions.size = 1;
+    spec.hidden_sizes = {32, 32};
+    spec.config.set_learning_rate(3e-3);
+    spec.config.set_learning_rate_decay_updates(kUpdates);
+    return spec;
+  }
+
+  // Trains on all actions at once; leaves the policy's Gaussian before the tanh in mean_, deviation_.
+  template <class Reward>
+  void Train(const AlgorithmSpec& spec, const VectorX<float>& actions, const Reward& reward) {
+    Batch batch;
+    batch.Resize({1, 1, 0}, actions.size(), /*with_keys=*/false);
+    batch.observations.setOnes();
+    batch.next_observations.setOnes();
+    batch.discounts.setZero();
+    batch.actions = actions.transpose();
+    for (Eigen::Index j = 0; j < actions.size(); ++j) batch.rewards[j] = reward(actions[j]);
+    algorithm_ = Make(spec);
+    for (int i = 0; i < kUpdates; ++i) ASSERT_TRUE(algorithm_->Update({batch, batch, batch}).ok());
+    PolicySnapshot snapshot;
+    algorithm_->ExportPolicy(&snapshot);
+    MlpActivations<float> activations;
+    const MatrixX<float>& output =
+        MlpForward<float>(MlpShape(1, spec.hidden_sizes, 2), snapshot.Find(kPolicyNetwork)->data(),
+                          MatrixX<float>::Ones(1, 1), &activations);
+    mean_ = output(0, 0);
+    deviation_ = std::exp(output(1, 0));
+  }
+
+  static VectorX<float> UniformActions() { return VectorX<float>::LinSpaced(kActions, -0.98f, 0.98f); }
+  // tanh of the quantiles of a normal of mean 0: its draws, without their chance.
+  static VectorX<float> NormalActions(double deviation) {
+    VectorX<float> actions(kActions);
+    for (int i = 0; i < kActions; ++i) {
+      double low = -8, high = 8;
+      while (high - low > 1e-9) {
+        const double middle = (low + high) / 2;
+        const double below = std::erfc(-middle / std::numbers::sqrt2) / 2;
+        (below < (i + 0.5) / kActions ? low : high) = middle;
+      }
+      actions[i] = static_cast<float>(std::tanh(deviation * low));
+    }
+    return actions;
+  }
+
+  std::unique_ptr<Algorithm> algorithm_;
+  double mean_ = 0, deviation_ = 0;
+};
+
+TEST_F(Bandit, Td3FindsTheBestAction) {
+  // A tent: of a parabola's top a critic's smallest error would move the greatest value far.
+  const auto reward = [](float a) { return -std::abs(a - 0.4f); };
+  Train(Spec(AlgorithmConfig::kTd3), UniformActions(), reward);
+  EXPECT_NEAR(std::tanh(mean_), 0.4, 0.05);
+}
+
+TEST_F(Bandit, AwacFitsTheDataWeightedByItsAdvantages) {
+  // Of uniform actions and the reward -(a - 0.4)^2 the weighted data is a normal of variance lambda / 2.
+  AlgorithmSpec spec = Spec(AlgorithmConfig::kAwac);
+  spec.config.mutable_awac()->set_temperature(0.02);
+  spec.config.mutable_awac()->set_value_samples(4);
+  const auto reward = [](float a) { return -(a - 0.4f) * (a - 0.4f); };
+  Train(spec, UniformActions(), reward);
+  EXPECT_NEAR(std::tanh(mean_), 0.4, 0.05);
+  EXPECT_NEAR(deviation_, 0.1 / (1 - 0.4 * 0.4), 0.04);  // 0.1, through the slope of atanh
+}
+
+TEST_F(Bandit, AwacsLikelihoodOfASingleActionStaysBounded) {
+  AlgorithmSpec spec = Spec(AlgorithmConfig::kAwac);
+  spec.config.mutable_awac()->set_max_weight(1);
+  const auto reward = [](float) { return 0.5f; };
+  Train(spec, VectorX<float>::Constant(kActions, 0.3f), reward);
+  EXPECT_NEAR(std::tanh(mean_), 0.3, 0.01);
+  // At the lower limit of the log-std, at the mean itself: the density's greatest logarithm.
+  const double greatest = 5 - 0.9189 - std::log(1 - 0.3 * 0.3);
+  EXPECT_GE(Metric(*algorithm_, "train/actor_loss"), -greatest - 1e-3);
+}
+
+TEST_F(Bandit, BracTradesRewardForDivergence) {
+  // Before the tanh the behaviour is N(0, 0.5^2) and the reward is u, so the optimum, in proportion to
+  // beta exp(u / alpha), is N(0.5^2 / alpha, 0.5^2).
+  AlgorithmSpec spec = Spec(AlgorithmConfig::kBrac);
+  spec.config.mutable_brac()->set_first_multiplier(0.5);
+  const auto reward = [](float a) { return std::atanh(a); };
+  Train(spec, NormalActions(0.5), reward);
+  EXPECT_NEAR(mean_, 0.5, 0.1);
+  EXPECT_NEAR(deviation_, 0.5, 0.1);
+  EXPECT_NEAR(Metric(*algorithm_, "train/divergence"), 0.5, 0.2);  // mean^2 / (2 * 0.5^2)
+}
+
+TEST_F(Bandit, BracsAdaptiveMultiplierHoldsTheDivergenceAtEpsilon) {
+  // A divergence of 0.5 is a shift of the mean by one deviation.
+  AlgorithmSpec spec = Spec(AlgorithmConfig::kBrac);
+  spec.config.mutable_brac()->set_adaptive_multiplier(true);
+  spec.config.mutable_brac()->set_epsilon(0.5);
+  spec.config.mutable_brac()->set_multiplier_learning_rate(0.01);
+  const auto reward = [](float a) { return 3 * std::atanh(a); };
+  Train(spec, NormalActions(0.5), reward);
+  EXPECT_NEAR(mean_, 0.5, 0.1);
+  EXPECT_NEAR(deviation_, 0.5, 0.1);
+  EXPECT_NEAR(Metric(*algorithm_, "train/multiplier"), 3 * 0.5 * 0.5 / 0.5, 0.5);
+}
+
+}  // namespace
+}  // namespace dbr

@@ -1,0 +1,132 @@
+// The policy service over a real socket: the newest snapshot, and nothing in between for those who are slow.
+#include "learner/runtime/policy_service.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/channel.h"
+#include "proto/codec.h"
+#include "proto/server.h"
+#include "tests/temp_dir.h"
+
+namespace dbr {
+namespace {
+
+PolicySnapshot Snapshot(std::uint64_t version) {
+  PolicySnapshot snapshot;
+  snapshot.version = version;
+  snapshot.updates = 10 * version;
+  snapshot.spec = {"test", "dbr", 1, {ActionKind::kDiscrete, 2}, {}};
+  snapshot.networks = {{kPolicyNetwork, {static_cast<float>(version), 2, 3, 4}}};
+  return snapshot;
+}
+
+class PolicyServiceTest : public testing::Test {
+ protected:
+  PolicyServiceTest() : service_([this](const EvaluationReport& report) { reports_.push_back(report); }) {
+    auto running = StartServer({"unix:" + folder_.path() + "/learner.sock"}, {&service_});
+    EXPECT_TRUE(running.ok()) << running.status();
+    running_ = std::move(running).value();
+    stub_ = Policy::NewStub(MakeChannel(running_.address));
+    SetDeadline(absl::Seconds(20), &context_);
+  }
+  ~PolicyServiceTest() override {
+    context_.TryCancel();
+    service_.Close();
+  }
+
+  TempDir folder_;
+  std::vector<EvaluationReport> reports_;
+  PolicyService service_;
+  RunningServer running_;
+  std::unique_ptr<Policy::Stub> stub_;
+  grpc::ClientContext context_;
+};
+
+TEST_F(PolicyServiceTest, SubscribersGetTheNewestAndThenEachNewerOne) {
+  service_.Publish(Snapshot(1));
+  service_.Publish(Snapshot(2));
+  const auto reader = stub_->Subscribe(&context_, SubscribeRequest());
+  PolicyMessage message;
+  ASSERT_TRUE(reader->Read(&message));
+  const auto snapshot = Decode(message);
+  ASSERT_TRUE(snapshot.ok()) << snapshot.status();
+  EXPECT_EQ(snapshot->version, 2u);
+  EXPECT_EQ(snapshot->networks, Snapshot(2).networks);
+  service_.Publish(Snapshot(3));
+  ASSERT_TRUE(reader->Read(&message));
+  EXPECT_EQ(message.version(), 3u);
+}
+
+TEST_F(PolicyServiceTest, StatusNamesTheSlowestSubscriber) {
+  service_.Publish(Snapshot(4));
+  LearnerStatus status;
+  status.set_policy_version(4);
+  service_.SetStatus(status);
+  const auto reader = stub_->Subscribe(&context_, SubscribeRequest());
+  PolicyMessage message;
+  ASSERT_TRUE(reader->Read(&message));
+  // The version is entered after the write: the next message comes after that.
+  service_.Publish(Snapshot(5));
+  ASSERT_TRUE(reader->Read(&message));
+  grpc::ClientContext context;
+  LearnerStatus reply;
+  ASSERT_TRUE(stub_->Status(&context, LearnerStatusRequest(), &reply).ok());
+  EXPECT_EQ(reply.subscribers(), 1u);
+  EXPECT_EQ(reply.oldest_subscriber_version(), 4u);
+}
+
+TEST_F(PolicyServiceTest, CloseEndsSubscriptions) {
+  service_.Publish(Snapshot(1));
+  const auto reader = stub_->Subscribe(&context_, SubscribeRequest());
+  PolicyMessage message;
+  ASSERT_TRUE(reader->Read(&message));
+  service_.Close();
+  EXPECT_FALSE(reader->Read(&message));
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+}
+
+TEST_F(PolicyServiceTest, KeepsTheNewestEvaluationOfEachOpponent) {
+  for (const double score : {0.5, 0.75}) {
+    EvaluationReport report;
+    report.set_opponent("random");
+    report.set_episodes(10);
+    report.set_score_mean(score);
+    grpc::ClientContext context;
+    EvaluationReportReply reply;
+    ASSERT_TRUE(stub_->ReportEvaluation(&context, report, &reply).ok());
+  }
+  grpc::ClientContext context;
+  LearnerStatus status;
+  ASSERT_TRUE(stub_->Status(&context, LearnerStatusRequest(), &status).ok());
+  ASSERT_EQ(status.evaluations_size(), 1);
+  EXPECT_EQ(status.evaluations(0).score_mean(), 0.75);
+  EXPECT_EQ(reports_.size(), 2u);
+}
+
+TEST_F(PolicyServiceTest, KeepsWhatEvaluatorsSkipped) {
+  for (const std::vector<std::uint64_t>& skipped : {std::vector<std::uint64_t>{5, 6}, {5, 6}, {}, {2}}) {
+    EvaluationReport report;
+    report.set_episodes(10);
+    report.mutable_skipped_iterations()->Assign(skipped.begin(), skipped.end());
+    grpc::ClientContext context;
+    EvaluationReportReply reply;
+    ASSERT_TRUE(stub_->ReportEvaluation(&context, report, &reply).ok());
+  }
+  service_.SetStatus(LearnerStatus());
+  grpc::ClientContext context;
+  LearnerStatus status;
+  ASSERT_TRUE(stub_->Status(&context, LearnerStatusRequest(), &status).ok());
+  EXPECT_THAT(status.skipped_iterations(), testing::ElementsAre(2, 5, 6));
+}
+
+TEST_F(PolicyServiceTest, RefusesAnEvaluationWithoutEpisodes) {
+  grpc::ClientContext context;
+  EvaluationReportReply reply;
+  const grpc::Status status = stub_->ReportEvaluation(&context, EvaluationReport(), &reply);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_TRUE(reports_.empty());
+}
+
+}  // namespace
+}  // namespace dbr

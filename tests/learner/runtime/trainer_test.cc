@@ -1,0 +1,234 @@
+// The learner against a real replay server: updates, advantages written back, checkpoints, continuation.
+#include "learner/runtime/trainer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <thread>
+
+#include "absl/time/clock.h"
+#include "proto/config_file.h"
+#include "replay/client/writer.h"
+#include "replay/service/replay_server.h"
+#include "tests/learner/algorithms/batches.h"
+#include "tests/temp_dir.h"
+
+namespace dbr {
+namespace {
+
+constexpr std::uint64_t kUpdates = 30;
+
+class TrainerTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    Config config;
+    config.mutable_replay()->set_capacity(1000);
+    config.mutable_replay()->set_min_size(64);
+    StartReplay(OptionsFrom(config, Layout()));
+    auto metrics = MetricsSink::Open(RunFolder{folder_.path()}, absl::Seconds(1), absl::Now());
+    ASSERT_TRUE(metrics.ok()) << metrics.status();
+    metrics_ = std::move(metrics).value();
+  }
+
+  // In the place of the one before.
+  void StartReplay(ReplayServerOptions options) {
+    replay_.reset();
+    options.server.address = "unix:" + folder_.path() + "/replay.sock";
+    auto replay = ReplayServer::Start(options);
+    ASSERT_TRUE(replay.ok()) << replay.status();
+    replay_ = std::move(replay).value();
+  }
+
+  static TransitionLayout Layout() { return {5, 1, 3}; }
+
+  // Unjudged transitions.
+  void Insert(int count) {
+    TransitionWriter writer({.address = replay_->address(), .name = "test", .layout = Layout()});
+    const Batch batch = RandomBatch<float>(SmallSpec(), count, rng_);
+    const auto column = [](const MatrixX<float>& m, int j) {
+      return absl::Span<const float>(m.data() + m.rows() * j, static_cast<std::size_t>(m.rows()));
+    };
+    for (int j = 0; j < count; ++j) {
+      const TransitionView view{column(batch.observations, j),
+                                column(batch.actions, j),
+                                column(batch.masks, j),
+                                batch.rewards[j],
+                                batch.discounts[j],
+                                column(batch.next_observations, j),
+                                column(batch.next_masks, j)};
+      ASSERT_TRUE(writer.Append(view, kUnjudged, 0, std::nullopt, absl::Seconds(10)).ok());
+    }
+    ASSERT_TRUE(writer.Flush(absl::Seconds(10)).ok());
+  }
+
+  std::unique_ptr<Trainer> MakeTrainer(std::uint64_t max_updates) {
+    LearnerConfig config;
+    config.set_max_updates(max_updates);
+    config.set_push_every(10);
+    config.set_metrics_every(10);
+    AlgorithmSpec spec = SmallSpec();
+    TrainerParts parts{.algorithm = MakeAlgorithm(spec).value(),
+                       .policy_service = &service_,
+                       .metrics = metrics_.get(),
+                       .saver = &saver_,
+                       .prefetcher = nullptr,
+                       .relabeller = nullptr};
+    const BatchNeeds needs = parts.algorithm->needs();
+    draws_ = std::make_unique<ReplayClient>(replay_->address());
+    labels_ = std::make_unique<ReplayClient>(replay_->address());
+    parts.relabeller = std::make_unique<Relabeller>(labels_.get());
+    parts.prefetcher = std::make_unique<Prefetcher>(
+        draws_.get(),
+        PrefetcherOptions{.counts = {needs.uniform, needs.plus, needs.minus}, .layout = Layout()});
+    return std::make_unique<Trainer>(config, std::move(parts));
+  }
+
+  // Runs until the service says that this run has finished, then stops.
+  void RunToTheEnd(Trainer* trainer) {
+    service_.SetStatus(LearnerStatus());  // not the end of a run before
+    std::thread thread([&] { EXPECT_TRUE(trainer->Run().ok()); });
+    const absl::Time deadline = absl::Now() + absl::Seconds(60);
+    LearnerStatus status;
+    while (!status.finished() && absl::Now() < deadline) {
+      service_.Status(nullptr, nullptr, &status);
+      std::this_thread::yield();
+    }
+    EXPECT_TRUE(status.finished());
+    trainer->Stop();
+    thread.join();
+  }
+
+  Rng rng_{4};
+  TempDir folder_;
+  std::unique_ptr<ReplayServer> replay_;
+  std::unique_ptr<MetricsSink> metrics_;
+  PolicyService service_{[](const EvaluationReport&) {}};
+  Saver saver_{RunFolder{folder_.path()}, 3};
+  std::unique_ptr<ReplayClient> draws_, labels_;
+};
+
+TEST_F(TrainerTest, TrainsWritesAdvantagesBackAndSaves) {
+  Insert(100);
+  const auto trainer = MakeTrainer(kUpdates);
+  RunToTheEnd(trainer.get());
+  EXPECT_EQ(trainer->updates(), kUpdates);
+  ReplayClient client(replay_->address());
+  const auto stats = client.Stats(absl::Seconds(10));
+  ASSERT_TRUE(stats.ok()) << stats.status();
+  EXPECT_GT(stats->relabelled(), 0u);
+  EXPECT_GT(stats->plus() + stats->minus(), 0u);
+  const auto policy = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
+  ASSERT_TRUE(policy.ok()) << policy.status();
+  EXPECT_EQ(policy->updates, kUpdates);
+}
+
+// The advantage ARM_CUMULATIVE from the config to the labels in the store: A_T = max(A_{T-1}, 0) + (Q - V),
+// whatever the sign, for every time that a transition is judged.
+TEST_F(TrainerTest, CumulativeAdvantagesAddUpInTheReplay) {
+  const auto config =
+      ParseConfig("algorithm { dbr { advantage: ARM_CUMULATIVE } } replay { capacity: 1000 min_size: 64 }");
+  ASSERT_TRUE(config.ok()) << config.status();
+  ReplayServerOptions options = OptionsFrom(*config, Layout());
+  options.store.path = folder_ / "replay.store";
+  StartReplay(options);
+  Insert(100);
+  AlgorithmSpec spec = SmallSpec();
+  *spec.config.mutable_dbr() = config->algorithm().dbr();
+  const auto algorithm = MakeAlgorithm(spec).value();
+  const BatchNeeds needs = algorithm->needs();
+  ReplayClient client(replay_->address());
+  std::map<std::uint64_t, float> expected;
+  int above_newest = 0;
+  for (std::uint64_t version = 1; version <= kUpdates; ++version) {
+    DrawnBatches drawn;
+    ASSERT_TRUE(
+        client.Sample({needs.uniform, needs.plus, needs.minus}, Layout(), absl::Seconds(10), &drawn).ok());
+    ASSERT_TRUE(algorithm->Update({drawn.uniform, drawn.plus, drawn.minus}).ok());
+    const absl::Span<const float> advantages = algorithm->advantages();
+    ASSERT_TRUE(client.Relabel(version, drawn.uniform.keys, advantages, absl::Seconds(10)).ok());
+    for (std::size_t i = 0; i < advantages.size(); ++i) {
+      float& sum = expected.try_emplace(drawn.uniform.keys[i], 0.0f).first->second;
+      sum = std::max(sum, 0.0f) + advantages[i];
+      above_newest += sum > advantages[i];
+    }
+  }
+  EXPECT_GT(above_newest, 100) << "else this could not be told from ARM";
+  replay_.reset();
+  options.store.resume = true;
+  const auto store = TransitionStore::Open(options.store);
+  ASSERT_TRUE(store.ok()) << store.status();
+  ASSERT_GT(expected.size(), 90u);
+  for (const auto& [key, advantage] : expected) {
+    EXPECT_EQ((*store)->labels((*store)->SlotOf(key)).advantage, advantage) << key;
+  }
+}
+
+TEST_F(TrainerTest, ContinuesFromItsCheckpoint) {
+  Insert(100);
+  RunToTheEnd(MakeTrainer(kUpdates).get());
+  const auto saved = Checkpoints(RunFolder{folder_.path()}.checkpoints(), 3).LoadNewest();
+  ASSERT_TRUE(saved.ok()) << saved.status();
+  auto same = MakeTrainer(kUpdates);
+  ASSERT_TRUE(same->Load(saved->file).ok());
+  RunToTheEnd(same.get());  // makes no update, and saves
+  same.reset();             // before what it draws from
+  const auto saved_again = Checkpoints(RunFolder{folder_.path()}.checkpoints(), 3).LoadNewest();
+  ASSERT_TRUE(saved_again.ok()) << saved_again.status();
+  EXPECT_NE(saved_again->file.metadata, saved->file.metadata) << "of the same save: versions must go on";
+  EXPECT_EQ(saved_again->file.tensors, saved->file.tensors);
+  const auto policy_before = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
+  const auto again = MakeTrainer(2 * kUpdates);
+  ASSERT_TRUE(again->Load(saved->file).ok());
+  EXPECT_EQ(again->updates(), kUpdates);
+  RunToTheEnd(again.get());
+  EXPECT_EQ(again->updates(), 2 * kUpdates);
+  const auto policy_after = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
+  ASSERT_TRUE(policy_before.ok() && policy_after.ok());
+  EXPECT_GT(policy_after->version, policy_before->version);
+}
+
+TEST(SaverTest, WhatComesLateDoesNotTakeThePlaceOfWhatIsNewer) {
+  const TempDir folder;
+  Saver saver(RunFolder{folder.path()}, 3);
+  Checkpoint checkpoint;
+  MakeAlgorithm(SmallSpec()).value()->ExportPolicy(&checkpoint.policy);
+  for (const std::uint64_t updates : {20, 10, 30}) {
+    checkpoint.updates = checkpoint.policy.updates = updates;
+    ASSERT_TRUE(saver.SaveNow(checkpoint).ok());
+    EXPECT_EQ(LoadPolicy(RunFolder{folder.path()}.latest_policy())->updates,
+              std::max<std::uint64_t>(20, updates));
+  }
+}
+
+TEST_F(TrainerTest, VersionsGoOnAfterTheNewestThatTheReplayHasSeen) {
+  Insert(100);
+  const auto trainer = MakeTrainer(kUpdates);
+  trainer->StartVersionsAfter(1000);
+  RunToTheEnd(trainer.get());
+  const auto policy = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
+  ASSERT_TRUE(policy.ok()) << policy.status();
+  EXPECT_GT(policy->version, 1000u);
+}
+
+TEST_F(TrainerTest, StopsWhileTheRateLimiterHoldsTheFirstDraw) {
+  Insert(10);  // below min_size
+  const auto trainer = MakeTrainer(kUpdates);
+  std::thread thread([&] { EXPECT_TRUE(trainer->Run().ok()); });
+  trainer->Stop();
+  thread.join();
+  EXPECT_EQ(trainer->updates(), 0u);
+}
+
+TEST_F(TrainerTest, ABatchOfOtherWidthsIsAFinalError) {
+  Insert(100);
+  ReplayClient client(replay_->address());
+  Prefetcher prefetcher(&client, {.counts = {4, 0, 0}, .layout = {6, 1, 3}});
+  const auto batches = prefetcher.Next();
+  EXPECT_TRUE(absl::IsInvalidArgument(batches.status())) << batches.status();
+  EXPECT_THAT(std::string(batches.status().message()), testing::HasSubstr("observation_width"));
+}
+
+}  // namespace
+}  // namespace dbr
