@@ -12,9 +12,9 @@
 #include "core/rng.h"
 #include "core/safetensors.h"
 #include "core/status_macros.h"
-#include "proto/channel.h"
-#include "proto/config_file.h"
-#include "proto/grpc_status.h"
+#include "proto/config/config_file.h"
+#include "proto/rpc/channel.h"
+#include "proto/rpc/grpc_status.h"
 #include "replay/client/await_stats.h"
 #include "replay/client/client.h"
 

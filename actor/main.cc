@@ -11,8 +11,8 @@
 #include "core/run_folder.h"
 #include "core/shutdown.h"
 #include "nn/blas_setup.h"
-#include "proto/config_file.h"
-#include "proto/service_main.h"
+#include "proto/config/config_file.h"
+#include "proto/rpc/service_main.h"
 
 namespace dbr {
 namespace {

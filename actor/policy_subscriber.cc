@@ -8,10 +8,10 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/status_macros.h"
-#include "proto/channel.h"
-#include "proto/codec.h"
-#include "proto/config_file.h"
-#include "proto/grpc_status.h"
+#include "proto/config/config_file.h"
+#include "proto/rpc/channel.h"
+#include "proto/rpc/codec.h"
+#include "proto/rpc/grpc_status.h"
 
 namespace dbr {
 namespace {

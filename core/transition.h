@@ -38,7 +38,7 @@ struct TransitionLayout {
   int mask_width = 0;
   int return_width = 0;  // 1 where transitions carry their Monte-Carlo return, else 0
 
-  // `with_returns`: as NeedsReturns (proto/config_file.h) says of the run's config.
+  // `with_returns`: as NeedsReturns (proto/config/config_file.h) says of the run's config.
   static TransitionLayout Of(const EnvSpec& spec, bool with_returns = false) {
     return {spec.observation_size, spec.actions.width(), spec.actions.mask_width(), with_returns ? 1 : 0};
   }

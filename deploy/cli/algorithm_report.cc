@@ -13,7 +13,7 @@
 #include "core/check.h"
 #include "deploy/terminal/terminal.h"
 #include "proto/config.pb.h"
-#include "proto/config_fields.h"
+#include "proto/config/config_fields.h"
 
 namespace dbr {
 namespace {

@@ -10,7 +10,7 @@
 #include "core/run_folder.h"
 #include "core/safetensors.h"
 #include "core/status_macros.h"
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 
 namespace dbr {
 

@@ -16,7 +16,7 @@
 #include "deploy/experiment/run.h"
 #include "deploy/experiment/schedule.h"
 #include "deploy/terminal/terminal.h"
-#include "proto/experiment_file.h"
+#include "proto/config/experiment_file.h"
 
 namespace dbr {
 namespace {

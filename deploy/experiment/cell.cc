@@ -14,7 +14,7 @@
 #include "deploy/launch/run_plan.h"
 #include "deploy/launch/same_run.h"
 #include "deploy/terminal/terminal.h"
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 
 namespace dbr {
 namespace {

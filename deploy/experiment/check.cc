@@ -17,8 +17,8 @@
 #include "core/space.h"
 #include "deploy/experiment/cell.h"
 #include "deploy/launch/run_plan.h"
-#include "proto/config_fields.h"
-#include "proto/config_file.h"
+#include "proto/config/config_fields.h"
+#include "proto/config/config_file.h"
 
 namespace dbr {
 namespace {

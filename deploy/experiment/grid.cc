@@ -9,8 +9,8 @@
 #include "absl/strings/str_cat.h"
 #include "core/status_macros.h"
 #include "deploy/experiment/check.h"
-#include "proto/config_check.h"
-#include "proto/config_fields.h"
+#include "proto/config/config_check.h"
+#include "proto/config/config_fields.h"
 
 namespace dbr {
 namespace {

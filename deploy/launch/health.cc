@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "proto/channel.h"
-#include "proto/grpc_status.h"
+#include "proto/rpc/channel.h"
+#include "proto/rpc/grpc_status.h"
 
 namespace dbr {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "proto/channel.h"
+#include "proto/rpc/channel.h"
 
 namespace dbr {
 namespace {

@@ -20,7 +20,7 @@
 #include "deploy/launch/same_run.h"
 #include "envs/env.h"
 #include "learner/algorithm.h"
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 #include "replay/service/replay_server.h"
 #include "replay/service/seed_import.h"
 

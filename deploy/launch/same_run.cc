@@ -6,7 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/status_macros.h"
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 
 namespace dbr {
 namespace {

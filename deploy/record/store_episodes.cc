@@ -11,7 +11,7 @@
 #include "core/run_folder.h"
 #include "core/status_macros.h"
 #include "envs/env.h"
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 
 namespace dbr {
 namespace {

@@ -17,7 +17,7 @@
 #include "deploy/launch/summary_reader.h"
 #include "deploy/report/grid.h"
 #include "deploy/report/settings.h"
-#include "proto/experiment_file.h"
+#include "proto/config/experiment_file.h"
 
 namespace dbr::report {
 namespace {

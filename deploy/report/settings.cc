@@ -8,8 +8,8 @@
 #include "absl/strings/str_format.h"
 #include "core/crc32c.h"
 #include "core/status_macros.h"
-#include "proto/config_file.h"
-#include "proto/config_text.h"
+#include "proto/config/config_file.h"
+#include "proto/config/config_text.h"
 
 namespace dbr::report {
 namespace {

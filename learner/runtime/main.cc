@@ -18,9 +18,9 @@
 #include "learner/runtime/rollout_reporter.h"
 #include "learner/runtime/trainer.h"
 #include "nn/blas_setup.h"
-#include "proto/config_file.h"
-#include "proto/server.h"
-#include "proto/service_main.h"
+#include "proto/config/config_file.h"
+#include "proto/rpc/server.h"
+#include "proto/rpc/service_main.h"
 #include "replay/client/await_stats.h"
 
 namespace dbr {

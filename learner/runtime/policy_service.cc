@@ -6,7 +6,7 @@
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/time/time.h"
-#include "proto/codec.h"
+#include "proto/rpc/codec.h"
 
 namespace dbr {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "absl/time/time.h"
-#include "proto/grpc_status.h"
+#include "proto/rpc/grpc_status.h"
 
 namespace dbr {
 namespace {

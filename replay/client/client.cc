@@ -8,9 +8,9 @@
 #include "absl/synchronization/mutex.h"
 #include "absl/time/clock.h"
 #include "core/status_macros.h"
-#include "proto/channel.h"
-#include "proto/codec.h"
-#include "proto/grpc_status.h"
+#include "proto/rpc/channel.h"
+#include "proto/rpc/codec.h"
+#include "proto/rpc/grpc_status.h"
 
 namespace dbr {
 namespace {

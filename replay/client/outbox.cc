@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "proto/codec.h"
+#include "proto/rpc/codec.h"
 
 namespace dbr {
 namespace {

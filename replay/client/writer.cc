@@ -11,9 +11,9 @@
 #include "absl/time/clock.h"
 #include "core/rng.h"
 #include "core/status_macros.h"
-#include "proto/channel.h"
-#include "proto/grpc_status.h"
 #include "proto/replay.grpc.pb.h"
+#include "proto/rpc/channel.h"
+#include "proto/rpc/grpc_status.h"
 #include "replay/client/outbox.h"
 #include "spdlog/spdlog.h"
 

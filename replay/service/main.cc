@@ -11,8 +11,8 @@
 #include "core/shutdown.h"
 #include "core/status_macros.h"
 #include "envs/env.h"
-#include "proto/config_file.h"
-#include "proto/service_main.h"
+#include "proto/config/config_file.h"
+#include "proto/rpc/service_main.h"
 #include "replay/service/replay_server.h"
 
 namespace dbr {

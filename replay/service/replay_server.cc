@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/status_macros.h"
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 
 namespace dbr {
 

@@ -7,7 +7,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "proto/config.pb.h"
-#include "proto/server.h"
+#include "proto/rpc/server.h"
 #include "replay/buffer/partitioned_buffer.h"
 #include "replay/service/seed_import.h"
 #include "replay/service/service.h"

@@ -6,7 +6,7 @@
 #include "absl/cleanup/cleanup.h"
 #include "absl/time/clock.h"
 #include "core/status_macros.h"
-#include "proto/grpc_status.h"
+#include "proto/rpc/grpc_status.h"
 #include "replay/service/service_codec.h"
 #include "spdlog/spdlog.h"
 

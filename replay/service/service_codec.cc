@@ -4,7 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/status_macros.h"
-#include "proto/codec.h"
+#include "proto/rpc/codec.h"
 
 namespace dbr {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 #include "replay/client/client.h"
 #include "replay/service/replay_server.h"
 #include "tests/actor/learner_double.h"

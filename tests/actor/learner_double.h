@@ -15,9 +15,9 @@
 #include "absl/time/clock.h"
 #include "core/check.h"
 #include "gtest/gtest.h"
-#include "proto/codec.h"
 #include "proto/policy.grpc.pb.h"
-#include "proto/server.h"
+#include "proto/rpc/codec.h"
+#include "proto/rpc/server.h"
 
 namespace dbr {
 

@@ -11,7 +11,7 @@
 #include "core/check.h"
 #include "nn/mlp.h"
 #include "nn/policy.h"
-#include "proto/codec.h"
+#include "proto/rpc/codec.h"
 
 namespace dbr {
 namespace {

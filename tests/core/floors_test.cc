@@ -128,7 +128,7 @@ TEST(FloorsTest, FindsEachKindOfViolation) {
   using testing::HasSubstr;
   EXPECT_THAT(Violation("core/rng.h", "nn/mlp.h"), HasSubstr("only from floors below"));
   EXPECT_THAT(Violation("nn/mlp.cc", "envs/env.h"), HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("replay/buffer/partitioned_buffer.cc", "proto/codec.h"),
+  EXPECT_THAT(Violation("replay/buffer/partitioned_buffer.cc", "proto/rpc/codec.h"),
               HasSubstr("only from floors below"));
   EXPECT_THAT(Violation("replay/store/writer_table.h", "replay/service/service.h"),
               HasSubstr("only from floors below"));
@@ -148,7 +148,7 @@ TEST(FloorsTest, AllowsWhatTheHouseAllows) {
   EXPECT_EQ(Violation("learner/algorithms/discrete_dbr.cc", "proto/config.pb.h"), "");
   EXPECT_EQ(Violation("learner/algorithms/discrete_dbr.cc", "nn/mlp.h"), "");
   EXPECT_EQ(Violation("replay/service/service.cc", "replay/buffer/partitioned_buffer.h"), "");
-  EXPECT_EQ(Violation("replay/client/writer.cc", "proto/codec.h"), "");
+  EXPECT_EQ(Violation("replay/client/writer.cc", "proto/rpc/codec.h"), "");
   EXPECT_EQ(Violation("actor/step_loop.cc", "replay/client/writer.h"), "");
   EXPECT_EQ(Violation("learner/runtime/trainer.cc", "learner/algorithm.h"), "");
   EXPECT_EQ(Violation("learner/runtime/main.cc", "learner/runtime/trainer.h"), "");

@@ -9,7 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
-#include "proto/server.h"
+#include "proto/rpc/server.h"
 #include "tests/integration/dbr_process.h"
 #include "tests/integration/run_files.h"
 #include "tests/temp_dir.h"

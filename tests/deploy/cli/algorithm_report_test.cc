@@ -8,7 +8,7 @@
 #include <set>
 #include <string>
 
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 
 namespace dbr {
 namespace {

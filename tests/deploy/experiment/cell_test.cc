@@ -10,7 +10,7 @@
 #include "core/file_io.h"
 #include "core/run_folder.h"
 #include "deploy/launch/run_plan.h"
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 #include "tests/temp_dir.h"
 
 namespace dbr {

@@ -12,8 +12,8 @@
 #include "absl/strings/str_split.h"
 #include "core/file_io.h"
 #include "deploy/experiment/cell.h"
-#include "proto/config_file.h"
-#include "proto/experiment_file.h"
+#include "proto/config/config_file.h"
+#include "proto/config/experiment_file.h"
 #include "tests/temp_dir.h"
 
 namespace dbr {

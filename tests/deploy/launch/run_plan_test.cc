@@ -11,7 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
 #include "deploy/launch/same_run.h"
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 #include "tests/temp_dir.h"
 
 namespace dbr {

@@ -10,7 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
 #include "deploy/launch/run_plan.h"
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 #include "replay/dataset/dataset_writer.h"
 #include "tests/temp_dir.h"
 

@@ -11,8 +11,8 @@
 #include "deploy/cli/command_line.h"
 #include "deploy/launch/health.h"
 #include "deploy/launch/monitor.h"
-#include "proto/config_file.h"
-#include "proto/server.h"
+#include "proto/config/config_file.h"
+#include "proto/rpc/server.h"
 #include "tests/temp_dir.h"
 
 namespace dbr {

@@ -8,7 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/check.h"
 #include "core/file_io.h"
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 
 namespace dbr {
 namespace {

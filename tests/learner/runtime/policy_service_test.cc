@@ -4,9 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "proto/channel.h"
-#include "proto/codec.h"
-#include "proto/server.h"
+#include "proto/rpc/channel.h"
+#include "proto/rpc/codec.h"
+#include "proto/rpc/server.h"
 #include "tests/temp_dir.h"
 
 namespace dbr {

@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "absl/time/clock.h"
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 #include "replay/client/writer.h"
 #include "replay/service/replay_server.h"
 #include "tests/learner/algorithms/batches.h"

@@ -11,9 +11,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/rng.h"
-#include "proto/channel.h"
-#include "proto/codec.h"
 #include "proto/replay.grpc.pb.h"
+#include "proto/rpc/channel.h"
+#include "proto/rpc/codec.h"
 #include "replay/client/client.h"
 #include "replay/service/replay_server.h"
 #include "tests/replay/rows.h"

@@ -16,7 +16,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
 #include "core/run_folder.h"
-#include "proto/channel.h"
+#include "proto/rpc/channel.h"
 #include "replay/client/client.h"
 #include "replay/client/writer.h"
 #include "tests/replay/rows.h"

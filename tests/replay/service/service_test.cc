@@ -7,10 +7,10 @@
 #include <thread>
 
 #include "absl/strings/str_cat.h"
-#include "proto/channel.h"
-#include "proto/codec.h"
-#include "proto/grpc_status.h"
-#include "proto/server.h"
+#include "proto/rpc/channel.h"
+#include "proto/rpc/codec.h"
+#include "proto/rpc/grpc_status.h"
+#include "proto/rpc/server.h"
 #include "replay/client/await_stats.h"
 #include "replay/client/client.h"
 #include "replay/client/writer.h"

@@ -1,4 +1,4 @@
-#include "proto/server.h"
+#include "proto/rpc/server.h"
 
 #include <gmock/gmock.h>
 #include <grpcpp/generic/generic_stub.h>
@@ -12,8 +12,8 @@
 #include <memory>
 
 #include "core/file_io.h"
-#include "proto/channel.h"
 #include "proto/replay.grpc.pb.h"
+#include "proto/rpc/channel.h"
 #include "tests/temp_dir.h"
 
 namespace dbr {

@@ -1,4 +1,4 @@
-#include "proto/server.h"
+#include "proto/rpc/server.h"
 
 #include <arpa/inet.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
@@ -14,8 +14,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/strip.h"
 #include "core/status_macros.h"
-#include "proto/grpc_library.h"
-#include "proto/keepalive.h"
+#include "proto/rpc/grpc_library.h"
+#include "proto/rpc/keepalive.h"
 
 namespace dbr {
 namespace {

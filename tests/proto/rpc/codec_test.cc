@@ -1,4 +1,4 @@
-#include "proto/codec.h"
+#include "proto/rpc/codec.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "proto/grpc_status.h"
+#include "proto/rpc/grpc_status.h"
 
 namespace dbr {
 namespace {

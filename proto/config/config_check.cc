@@ -1,4 +1,4 @@
-#include "proto/config_check.h"
+#include "proto/config/config_check.h"
 
 #include <google/protobuf/descriptor.h>
 
@@ -7,7 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "proto/config.pb.h"
-#include "proto/config_text.h"
+#include "proto/config/config_text.h"
 
 namespace dbr {
 namespace {

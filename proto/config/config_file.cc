@@ -1,4 +1,4 @@
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/text_format.h>
@@ -8,9 +8,9 @@
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
 #include "core/status_macros.h"
-#include "proto/config_check.h"
-#include "proto/config_override.h"
-#include "proto/config_text.h"
+#include "proto/config/config_check.h"
+#include "proto/config/config_override.h"
+#include "proto/config/config_text.h"
 
 namespace dbr {
 namespace {

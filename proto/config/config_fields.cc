@@ -1,4 +1,4 @@
-#include "proto/config_fields.h"
+#include "proto/config/config_fields.h"
 
 #include <algorithm>
 #include <cerrno>

@@ -1,11 +1,11 @@
-#include "proto/experiment_file.h"
+#include "proto/config/experiment_file.h"
 
 #include <vector>
 
 #include "core/file_io.h"
 #include "core/status_macros.h"
-#include "proto/config_check.h"
-#include "proto/config_text.h"
+#include "proto/config/config_check.h"
+#include "proto/config/config_text.h"
 
 namespace dbr {
 namespace {

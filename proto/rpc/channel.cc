@@ -1,8 +1,8 @@
-#include "proto/channel.h"
+#include "proto/rpc/channel.h"
 
 #include "absl/time/clock.h"
-#include "proto/grpc_library.h"
-#include "proto/keepalive.h"
+#include "proto/rpc/grpc_library.h"
+#include "proto/rpc/keepalive.h"
 
 namespace dbr {
 

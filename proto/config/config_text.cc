@@ -1,11 +1,11 @@
-#include "proto/config_text.h"
+#include "proto/config/config_text.h"
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/io/tokenizer.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 
 #include "absl/strings/str_cat.h"
-#include "proto/config_fields.h"
+#include "proto/config/config_fields.h"
 
 namespace dbr {
 namespace {

@@ -1,4 +1,4 @@
-#include "proto/config_file.h"
+#include "proto/config/config_file.h"
 
 #include <gmock/gmock.h>
 #include <google/protobuf/util/message_differencer.h>

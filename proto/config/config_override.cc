@@ -1,4 +1,4 @@
-#include "proto/config_override.h"
+#include "proto/config/config_override.h"
 
 #include <google/protobuf/descriptor.h>
 
@@ -10,8 +10,8 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "absl/strings/strip.h"
-#include "proto/config_fields.h"
-#include "proto/config_text.h"
+#include "proto/config/config_fields.h"
+#include "proto/config/config_text.h"
 
 namespace dbr {
 namespace {

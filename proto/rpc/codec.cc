@@ -1,4 +1,4 @@
-#include "proto/codec.h"
+#include "proto/rpc/codec.h"
 
 #include <algorithm>
 #include <cstring>
