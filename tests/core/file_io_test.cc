@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "absl/cleanup/cleanup.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -140,7 +140,7 @@ TEST(FloorsTest, FindsEachKindOfViolation) {
   EXPECT_THAT(Violation("learner/algorithm.h", "absl/time/clock.h"), HasSubstr("no network, clock or file"));
   EXPECT_THAT(Violation("actor/step_loop.cc", "learner/runtime/trainer.h"),
               HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("core/rng.h", "tests/temp_dir.h"), HasSubstr("tests are above"));
+  EXPECT_THAT(Violation("core/rng.h", "tests/support/temp_dir.h"), HasSubstr("tests are above"));
   EXPECT_THAT(Violation("elsewhere/file.cc", "core/rng.h"), HasSubstr("no room"));
 }
 

@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file_io.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -12,7 +12,7 @@
 #include "absl/strings/str_split.h"
 #include "tests/integration/dbr_process.h"
 #include "tests/integration/run_files.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

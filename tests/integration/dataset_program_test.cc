@@ -15,7 +15,7 @@
 #include "envs/env.h"
 #include "replay/store/transition_store.h"
 #include "tests/integration/dbr_process.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -14,7 +14,7 @@
 #include "deploy/launch/commit.h"
 #include "tests/integration/dbr_process.h"
 #include "tests/integration/run_files.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

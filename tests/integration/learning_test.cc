@@ -6,8 +6,8 @@
 #include "core/run_folder.h"
 #include "tests/integration/dbr_process.h"
 #include "tests/integration/run_files.h"
-#include "tests/reference_dir.h"
-#include "tests/temp_dir.h"
+#include "tests/support/reference_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -8,7 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "tests/integration/dbr_process.h"
 #include "tests/integration/run_files.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

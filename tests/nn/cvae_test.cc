@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "core/rng.h"
-#include "tests/numeric.h"
+#include "tests/support/numeric.h"
 
 namespace dbr {
 namespace {

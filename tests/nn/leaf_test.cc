@@ -9,8 +9,8 @@
 #include "core/rng.h"
 #include "nn/divergence.h"
 #include "nn/tanh_gaussian.h"
-#include "tests/numeric.h"
-#include "tests/reference_json.h"
+#include "tests/support/numeric.h"
+#include "tests/support/reference_json.h"
 
 namespace dbr {
 namespace {

@@ -10,8 +10,8 @@
 #include "nn/categorical.h"
 #include "nn/mlp.h"
 #include "nn/policy.h"
-#include "tests/numeric.h"
-#include "tests/reference_json.h"
+#include "tests/support/numeric.h"
+#include "tests/support/reference_json.h"
 
 namespace dbr {
 namespace {

@@ -11,7 +11,7 @@
 #include "core/run_folder.h"
 #include "deploy/launch/run_plan.h"
 #include "proto/config/config_file.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -14,7 +14,7 @@
 #include "deploy/experiment/cell.h"
 #include "proto/config/config_file.h"
 #include "proto/config/experiment_file.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -18,7 +18,7 @@
 #include "envs/figure.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

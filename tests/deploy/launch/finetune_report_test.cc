@@ -15,7 +15,7 @@
 #include "deploy/launch/result_tables.h"
 #include "deploy/launch/results.h"
 #include "deploy/terminal/terminal.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

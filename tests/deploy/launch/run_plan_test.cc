@@ -12,7 +12,7 @@
 #include "core/file_io.h"
 #include "deploy/launch/same_run.h"
 #include "proto/config/config_file.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -12,7 +12,7 @@
 #include "deploy/launch/run_plan.h"
 #include "proto/config/config_file.h"
 #include "replay/dataset/dataset_writer.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

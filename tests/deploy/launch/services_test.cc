@@ -13,7 +13,7 @@
 #include "deploy/launch/monitor.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/server.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -17,8 +17,8 @@
 #include "deploy/probe/probe_report.h"
 #include "deploy/terminal/terminal.h"
 #include "nn/mlp.h"
-#include "tests/reference_dir.h"
-#include "tests/temp_dir.h"
+#include "tests/support/reference_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -21,7 +21,7 @@
 #include "core/file_io.h"
 #include "deploy/process/child_process.h"
 #include "deploy/process/log_tail.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

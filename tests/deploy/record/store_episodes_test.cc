@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/file_io.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -15,7 +15,7 @@
 #include "deploy/report/cells.h"
 #include "deploy/report/report.h"
 #include "tests/deploy/report/fake_experiment.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr::report {
 namespace {

@@ -16,7 +16,7 @@
 #include "deploy/report/settings.h"
 #include "envs/connect4/board.h"
 #include "nn/mlp.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr::report {
 namespace {

@@ -14,7 +14,7 @@
 #include "learner/objectives/self_imitation.h"
 #include "nn/policy_networks.h"
 #include "tests/learner/algorithms/batches.h"
-#include "tests/numeric.h"
+#include "tests/support/numeric.h"
 
 namespace dbr {
 namespace {

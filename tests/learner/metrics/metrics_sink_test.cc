@@ -16,7 +16,7 @@
 
 #include "core/crc32c.h"
 #include "core/file_io.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

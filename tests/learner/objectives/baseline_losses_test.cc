@@ -8,7 +8,7 @@
 #include "learner/objectives/behavior_kl_objective.h"
 #include "learner/objectives/deterministic_policy.h"
 #include "learner/objectives/gaussian_likelihood.h"
-#include "tests/numeric.h"
+#include "tests/support/numeric.h"
 
 namespace dbr {
 namespace {

@@ -8,7 +8,7 @@
 #include "learner/objectives/bear_objective.h"
 #include "learner/objectives/dual_behavior_objective.h"
 #include "learner/objectives/soft_policy_objective.h"
-#include "tests/numeric.h"
+#include "tests/support/numeric.h"
 
 namespace dbr {
 namespace {

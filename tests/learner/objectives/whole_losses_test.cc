@@ -10,7 +10,7 @@
 #include "core/rng.h"
 #include "learner/objectives/discrete_losses.h"
 #include "learner/objectives/dual_behavior_objective.h"
-#include "tests/numeric.h"
+#include "tests/support/numeric.h"
 
 namespace dbr {
 namespace {

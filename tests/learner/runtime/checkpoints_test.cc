@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "absl/strings/str_cat.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

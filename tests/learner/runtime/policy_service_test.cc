@@ -7,7 +7,7 @@
 #include "proto/rpc/channel.h"
 #include "proto/rpc/codec.h"
 #include "proto/rpc/server.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -13,7 +13,7 @@
 #include "replay/client/writer.h"
 #include "replay/service/replay_server.h"
 #include "tests/learner/algorithms/batches.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

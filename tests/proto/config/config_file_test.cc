@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "absl/strings/str_split.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -14,7 +14,7 @@
 #include "core/file_io.h"
 #include "proto/replay.grpc.pb.h"
 #include "proto/rpc/channel.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/replay/dataset/dataset_files.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -11,7 +11,7 @@
 #include <memory>
 
 #include "tests/replay/dataset/dataset_files.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

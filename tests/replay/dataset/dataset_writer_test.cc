@@ -8,7 +8,7 @@
 #include "core/file_io.h"
 #include "replay/dataset/hdf5_file.h"
 #include "tests/replay/dataset/dataset_files.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

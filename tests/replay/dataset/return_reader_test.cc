@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "tests/replay/dataset/dataset_files.h"
-#include "tests/temp_dir.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
-#include "tests/reference_dir.h"
+#include "tests/support/reference_dir.h"
 
 namespace dbr::connect4 {
 

@@ -12,7 +12,7 @@
 #include "envs/connect4/opponents.h"
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
-#include "tests/envs/connect4_reference.h"
+#include "tests/envs/connect4/reference.h"
 
 namespace dbr::connect4 {
 namespace {

@@ -1,3 +1,5 @@
+#include "envs/connect4/board.h"
+
 #include <array>
 #include <bit>
 #include <string>
@@ -5,7 +7,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/rng.h"
-#include "envs/connect4/board.h"
 #include "envs/connect4/playout.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"

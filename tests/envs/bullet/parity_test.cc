@@ -14,7 +14,7 @@
 #include "envs/bullet/locomotion_task.h"
 #include "envs/bullet/walker2d.h"
 #include "gtest/gtest.h"
-#include "tests/reference_json.h"
+#include "tests/support/reference_json.h"
 
 namespace dbr::bullet {
 namespace {

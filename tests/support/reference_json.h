@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/reference_dir.h"
+#include "tests/support/reference_dir.h"
 
 namespace dbr {
 

@@ -1,3 +1,5 @@
+#include "envs/connect4/env.h"
+
 #include <algorithm>
 #include <array>
 #include <numeric>
@@ -6,7 +8,6 @@
 
 #include "core/rng.h"
 #include "envs/connect4/board.h"
-#include "envs/connect4/env.h"
 #include "envs/env.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"

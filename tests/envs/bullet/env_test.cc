@@ -1,4 +1,6 @@
 // The robots as environments: what an episode is, what ends it, and what happens to a world that breaks.
+#include "envs/env.h"
+
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -9,7 +11,6 @@
 #include "core/rng.h"
 #include "envs/bullet/hopper.h"
 #include "envs/bullet/locomotion.h"
-#include "envs/env.h"
 #include "gtest/gtest.h"
 
 namespace dbr {
