@@ -1,4 +1,4 @@
-# The house rules of the build, set once: instruction set, warnings, sanitizers, and the three ways to declare a target.
+# The rules of the build, set once: instruction set, warnings, sanitizers, and the three ways to declare a target.
 
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -27,44 +27,44 @@ if(CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
 endif()
 
-add_library(house_flags INTERFACE)
-target_include_directories(house_flags INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
-target_compile_definitions(house_flags INTERFACE EIGEN_USE_BLAS EIGEN_MPL2_ONLY)
+add_library(dbr_flags INTERFACE)
+target_include_directories(dbr_flags INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR})
+target_compile_definitions(dbr_flags INTERFACE EIGEN_USE_BLAS EIGEN_MPL2_ONLY)
 if(DBR_ARCH)
-  target_compile_options(house_flags INTERFACE -march=${DBR_ARCH})
+  target_compile_options(dbr_flags INTERFACE -march=${DBR_ARCH})
 endif()
-target_compile_options(house_flags INTERFACE -fno-math-errno)
+target_compile_options(dbr_flags INTERFACE -fno-math-errno)
 foreach(sanitizer IN LISTS DBR_SANITIZE)
-  target_compile_options(house_flags INTERFACE -fsanitize=${sanitizer} -fno-omit-frame-pointer)
-  target_link_options(house_flags INTERFACE -fsanitize=${sanitizer})
+  target_compile_options(dbr_flags INTERFACE -fsanitize=${sanitizer} -fno-omit-frame-pointer)
+  target_link_options(dbr_flags INTERFACE -fsanitize=${sanitizer})
 endforeach()
 
-add_library(house_warnings INTERFACE)
-target_compile_options(house_warnings INTERFACE -Wall -Wextra -Wno-sign-compare)
+add_library(dbr_warnings INTERFACE)
+target_compile_options(dbr_warnings INTERFACE -Wall -Wextra -Wno-sign-compare)
 if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
-  target_compile_options(house_warnings INTERFACE -Wthread-safety)
+  target_compile_options(dbr_warnings INTERFACE -Wthread-safety)
 endif()
 if(DBR_WERROR)
-  target_compile_options(house_warnings INTERFACE -Werror)
+  target_compile_options(dbr_warnings INTERFACE -Werror)
 endif()
 
-# house_library(NAME SRCS a.cc b.cc DEPS public_libs... PRIVATE_DEPS libs...)
-function(house_library name)
+# dbr_library(NAME SRCS a.cc b.cc DEPS public_libs... PRIVATE_DEPS libs...)
+function(dbr_library name)
   cmake_parse_arguments(ARG "" "" "SRCS;DEPS;PRIVATE_DEPS" ${ARGN})
   add_library(${name} STATIC ${ARG_SRCS})
-  target_link_libraries(${name} PUBLIC house_flags ${ARG_DEPS} PRIVATE house_warnings ${ARG_PRIVATE_DEPS})
+  target_link_libraries(${name} PUBLIC dbr_flags ${ARG_DEPS} PRIVATE dbr_warnings ${ARG_PRIVATE_DEPS})
 endfunction()
 
-# house_binary(NAME SRCS main.cc DEPS libs...): a program in build/bin.
-function(house_binary name)
+# dbr_binary(NAME SRCS main.cc DEPS libs...): a program in build/bin.
+function(dbr_binary name)
   cmake_parse_arguments(ARG "" "" "SRCS;DEPS" ${ARGN})
   add_executable(${name} ${ARG_SRCS})
-  target_link_libraries(${name} PRIVATE house_flags house_warnings ${ARG_DEPS})
+  target_link_libraries(${name} PRIVATE dbr_flags dbr_warnings ${ARG_DEPS})
 endfunction()
 
-# house_test(NAME SRCS a_test.cc DEPS libs... LABELS slow TIMEOUT 60): a GoogleTest program that ctest runs as one test.
+# dbr_test(NAME SRCS a_test.cc DEPS libs... LABELS slow TIMEOUT 60): a GoogleTest program that ctest runs as one test.
 # Reference data: DBR_REFERENCE_DIR in the environment, else tests/reference (compiled in as DBR_DEFAULT_REFERENCE_DIR).
-function(house_test name)
+function(dbr_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "SRCS;DEPS;LABELS" ${ARGN})
   if(NOT DBR_TESTS)
     return()
@@ -73,7 +73,7 @@ function(house_test name)
     set(ARG_TIMEOUT 120)
   endif()
   add_executable(${name} ${ARG_SRCS})
-  target_link_libraries(${name} PRIVATE house_flags house_warnings ${ARG_DEPS} GTest::gmock GTest::gtest GTest::gtest_main)
+  target_link_libraries(${name} PRIVATE dbr_flags dbr_warnings ${ARG_DEPS} GTest::gmock GTest::gtest GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE
     DBR_DEFAULT_REFERENCE_DIR="${PROJECT_SOURCE_DIR}/tests/reference"
     DBR_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}"
