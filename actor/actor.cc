@@ -12,6 +12,7 @@
 #include "core/rng.h"
 #include "core/safetensors.h"
 #include "core/status_macros.h"
+#include "envs/registry/registry.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/channel.h"
 #include "proto/rpc/grpc_status.h"

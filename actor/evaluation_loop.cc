@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/status_macros.h"
-#include "envs/env.h"
+#include "envs/registry/registry.h"
 
 namespace dbr {
 namespace {

@@ -4,6 +4,7 @@
 
 #include "core/check.h"
 #include "core/status_macros.h"
+#include "envs/registry/registry.h"
 
 namespace dbr {
 

@@ -8,6 +8,7 @@
 #include "absl/status/statusor.h"
 #include "core/batch.h"
 #include "envs/env.h"
+#include "envs/registry/registry.h"
 
 namespace dbr {
 

@@ -2,12 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
-#include <string>
-#include <vector>
 
-#include "absl/status/statusor.h"
-#include "absl/strings/string_view.h"
 #include "absl/types/span.h"
 #include "core/space.h"
 
@@ -47,23 +42,5 @@ class Env {
   // What it looks like now, for drawing; after the first Reset. False where it has no figure.
   virtual bool GetFigure(Figure*) const { return false; }
 };
-
-// What an environment is made with.
-struct EnvOptions {
-  std::string name;
-  // Each episode draws one; empty: the environment's default. Only two-player games have opponents.
-  std::vector<std::string> opponents;
-};
-
-// Makes an environment by its name or alias. InvalidArgument, naming the known names, for an unknown
-// environment or opponent, and for opponents given to an environment that has none.
-absl::StatusOr<std::unique_ptr<Env>> MakeEnv(const EnvOptions& options);
-
-// All names, sorted; the conformance suite walks them.
-std::vector<std::string> EnvNames();
-
-// Opponents against which an environment is evaluated by default, for example random, one_ply, mcts:10,
-// mcts:100; empty where it has none.
-std::vector<std::string> EvaluationOpponents(absl::string_view env_name);
 
 }  // namespace dbr

@@ -1,5 +1,5 @@
-// The interface of a learning algorithm. One file in algorithms/ for each; composed of parts/, no other base
-// class.
+// The interface of a learning algorithm. Each has a file in algorithms/, is composed of what training/ and
+// objectives/ hold, and has no other base class.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,6 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "absl/status/statusor.h"
-#include "absl/strings/string_view.h"
 #include "absl/types/span.h"
 #include "core/batch.h"
 #include "core/policy_snapshot.h"
@@ -79,23 +77,7 @@ class Algorithm {
   virtual absl::Status Load(const TensorFile& file) = 0;
 };
 
-// Makes the algorithm that spec.config names. Errors: CheckServes.
-absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& spec);
-
-// InvalidArgument, naming those that do, unless the algorithm that `config` sets serves the actions of the
-// environment; or, naming the field, where the variant that it chooses does not.
-absl::Status CheckServes(const AlgorithmConfig& config, const std::string& env, const ActionSpace& actions);
-
-// Name of the algorithm that a config sets ("dbr").
+// Name of the algorithm that a config sets, as the member of its oneof ("dbr"); "" where it sets none.
 std::string AlgorithmName(const AlgorithmConfig& config);
-
-// All algorithms, once for each kind of action that they serve; the conformance suite walks them.
-struct AlgorithmId {
-  std::string name;  // as the member of AlgorithmConfig's oneof that sets it
-  ActionKind actions;
-  std::string source;    // the publication
-  std::string variants;  // the fields of its config message that choose between variants; may be empty
-};
-std::vector<AlgorithmId> Algorithms();
 
 }  // namespace dbr

@@ -12,6 +12,7 @@
 #include "absl/strings/str_split.h"
 #include "core/check.h"
 #include "deploy/terminal/terminal.h"
+#include "learner/algorithms/registry.h"
 #include "proto/config.pb.h"
 #include "proto/config/config_fields.h"
 

@@ -13,6 +13,7 @@
 #include "deploy/film/film_canvas.h"
 #include "deploy/film/webp_animation.h"
 #include "envs/figure.h"
+#include "envs/registry/registry.h"
 
 namespace dbr {
 namespace {

@@ -13,6 +13,7 @@
 #include "actor/vector_env.h"
 #include "core/rng.h"
 #include "core/status_macros.h"
+#include "envs/registry/registry.h"
 
 namespace dbr {
 namespace {

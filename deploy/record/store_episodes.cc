@@ -11,6 +11,7 @@
 #include "core/run_folder.h"
 #include "core/status_macros.h"
 #include "envs/env.h"
+#include "envs/registry/registry.h"
 #include "proto/config/config_file.h"
 
 namespace dbr {

@@ -1,9 +1,8 @@
-// The environments by name: one line each in the table. A plain table, for a registrar in a static archive
-// would be dropped by the linker.
+// One line an environment in the table. It is a plain table because the linker would drop a registrar in a
+// static archive.
+#include "envs/registry/registry.h"
+
 #include <algorithm>
-#include <memory>
-#include <string>
-#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
@@ -13,7 +12,6 @@
 #include "envs/bullet/locomotion.h"
 #include "envs/bullet/walker2d.h"
 #include "envs/connect4/env.h"
-#include "envs/env.h"
 
 namespace dbr {
 namespace {

@@ -1,11 +1,11 @@
-// The table of algorithms: one line for each.
+#include "learner/algorithms/registry.h"
+
 #include <algorithm>
 #include <iterator>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "core/status_macros.h"
-#include "learner/algorithm.h"
 #include "learner/algorithms/awac.h"
 #include "learner/algorithms/brac.h"
 #include "learner/algorithms/continuous_bear.h"
@@ -64,13 +64,6 @@ std::vector<AlgorithmId> Algorithms() {
   for (const Entry& entry : kAlgorithms)
     algorithms.push_back({entry.name, entry.actions, entry.source, entry.variants});
   return algorithms;
-}
-
-std::string AlgorithmName(const AlgorithmConfig& config) {
-  for (const Entry& entry : kAlgorithms) {
-    if (entry.config_case == config.algorithm_case()) return entry.name;
-  }
-  return "";
 }
 
 absl::Status CheckServes(const AlgorithmConfig& config, const std::string& env, const ActionSpace& actions) {

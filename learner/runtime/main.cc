@@ -13,6 +13,8 @@
 #include "core/shutdown.h"
 #include "core/status_macros.h"
 #include "envs/env.h"
+#include "envs/registry/registry.h"
+#include "learner/algorithms/registry.h"
 #include "learner/runtime/checkpoints.h"
 #include "learner/runtime/policy_service.h"
 #include "learner/runtime/rollout_reporter.h"

@@ -11,6 +11,7 @@
 #include "core/shutdown.h"
 #include "core/status_macros.h"
 #include "envs/env.h"
+#include "envs/registry/registry.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/service_main.h"
 #include "replay/service/replay_server.h"

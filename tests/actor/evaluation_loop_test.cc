@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "envs/registry/registry.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/actor/test_policies.h"

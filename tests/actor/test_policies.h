@@ -8,7 +8,7 @@
 
 #include "core/policy_snapshot.h"
 #include "core/rng.h"
-#include "envs/env.h"
+#include "envs/registry/registry.h"
 #include "nn/mlp.h"
 #include "nn/policy.h"
 

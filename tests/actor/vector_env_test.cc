@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "core/rng.h"
+#include "envs/registry/registry.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/actor/line_env.h"

@@ -11,7 +11,7 @@
 #include "envs/bullet/hopper.h"
 #include "envs/bullet/locomotion_task.h"
 #include "envs/bullet/walker2d.h"
-#include "envs/env.h"
+#include "envs/registry/registry.h"
 
 namespace dbr::bullet {
 namespace {

@@ -7,6 +7,7 @@
 #include "envs/connect4/mcts.h"
 #include "envs/connect4/playout.h"
 #include "envs/env.h"
+#include "envs/registry/registry.h"
 
 namespace dbr::connect4 {
 namespace {

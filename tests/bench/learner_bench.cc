@@ -4,6 +4,7 @@
 
 #include "core/rng.h"
 #include "learner/algorithm.h"
+#include "learner/algorithms/registry.h"
 
 namespace dbr {
 namespace {

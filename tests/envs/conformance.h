@@ -11,6 +11,7 @@
 
 #include "core/rng.h"
 #include "envs/env.h"
+#include "envs/registry/registry.h"
 #include "gtest/gtest.h"
 
 namespace dbr::conformance {

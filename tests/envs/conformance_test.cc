@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "envs/registry/registry.h"
 #include "gtest/gtest.h"
 
 namespace dbr::conformance {

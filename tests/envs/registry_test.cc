@@ -1,8 +1,9 @@
+#include "envs/registry/registry.h"
+
 #include <algorithm>
 #include <string>
 #include <vector>
 
-#include "envs/env.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 

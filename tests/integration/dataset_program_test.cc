@@ -13,6 +13,7 @@
 #include "core/file_io.h"
 #include "core/run_folder.h"
 #include "envs/env.h"
+#include "envs/registry/registry.h"
 #include "replay/store/transition_store.h"
 #include "tests/integration/dbr_process.h"
 #include "tests/support/temp_dir.h"

@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 
+#include "learner/algorithms/registry.h"
 #include "proto/config/config_file.h"
 
 namespace dbr {

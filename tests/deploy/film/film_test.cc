@@ -16,6 +16,7 @@
 #include "core/file_io.h"
 #include "deploy/film/film_canvas.h"
 #include "envs/figure.h"
+#include "envs/registry/registry.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/support/temp_dir.h"

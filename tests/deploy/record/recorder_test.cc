@@ -10,7 +10,7 @@
 
 #include "core/rng.h"
 #include "deploy/cli/shipped_file.h"
-#include "envs/env.h"
+#include "envs/registry/registry.h"
 #include "nn/mlp.h"
 
 namespace dbr {

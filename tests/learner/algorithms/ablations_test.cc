@@ -9,6 +9,7 @@
 
 #include "learner/algorithms/continuous_dbr.h"
 #include "learner/algorithms/discrete_dbr.h"
+#include "learner/algorithms/registry.h"
 #include "learner/objectives/gaussian_likelihood.h"
 #include "learner/objectives/munchausen.h"
 #include "learner/objectives/self_imitation.h"

@@ -10,6 +10,7 @@
 
 #include "absl/strings/match.h"
 #include "learner/algorithms/discrete_dbr.h"
+#include "learner/algorithms/registry.h"
 #include "learner/training/learning_rate.h"
 #include "nn/policy.h"
 #include "tests/learner/algorithms/allocation_count.h"

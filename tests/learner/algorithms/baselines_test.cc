@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "learner/algorithm.h"
+#include "learner/algorithms/registry.h"
 #include "nn/policy.h"
 #include "tests/learner/algorithms/batches.h"
 

@@ -6,6 +6,7 @@
 
 #include "learner/algorithms/continuous_bear.h"
 #include "learner/algorithms/discrete_bear.h"
+#include "learner/algorithms/registry.h"
 #include "nn/policy.h"
 #include "tests/learner/algorithms/batches.h"
 

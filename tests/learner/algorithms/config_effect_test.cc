@@ -14,6 +14,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "learner/algorithm.h"
+#include "learner/algorithms/registry.h"
 #include "tests/learner/algorithms/batches.h"
 
 namespace dbr {

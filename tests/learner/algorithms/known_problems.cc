@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "learner/algorithms/registry.h"
 #include "nn/categorical.h"
 #include "tests/learner/runtime/tiny_replay.h"
 

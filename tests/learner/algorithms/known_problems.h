@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "learner/algorithm.h"
+#include "learner/algorithms/registry.h"
 #include "nn/policy.h"
 
 namespace dbr {

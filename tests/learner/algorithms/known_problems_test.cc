@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "learner/algorithms/registry.h"
+
 namespace dbr {
 namespace {
 

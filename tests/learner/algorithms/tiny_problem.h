@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "learner/algorithm.h"
+#include "learner/algorithms/registry.h"
 #include "nn/policy.h"
 #include "tests/learner/algorithms/batches.h"
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "learner/algorithm.h"
+#include "learner/algorithms/registry.h"
 #include "tests/learner/algorithms/batches.h"
 
 namespace dbr {

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "absl/time/clock.h"
+#include "learner/algorithms/registry.h"
 #include "proto/config/config_file.h"
 #include "replay/client/writer.h"
 #include "replay/service/replay_server.h"
