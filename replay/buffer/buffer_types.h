@@ -20,7 +20,6 @@ struct BufferOptions {
   RateLimiterOptions limiter;
   bool cumulative_advantage =
       false;  // a relabel with a gives max(A, 0) + a in place of a (A: the label before)
-  std::string selector = "uniform";
   // Share of the seed in a draw from D, while D holds both; 0: as their sizes have it.
   double seed_share = 0;
   std::uint64_t seed = 1;

@@ -45,8 +45,7 @@ absl::Status CheckCount(const char* what, std::uint64_t found, std::uint64_t max
 absl::StatusOr<std::unique_ptr<PartitionedBuffer>> PartitionedBuffer::Make(
     std::unique_ptr<TransitionStore> store, const BufferOptions& options) {
   ASSIGN_OR_RETURN(const RateLimiter limiter, RateLimiter::Make(options.limiter, store->capacity()));
-  ASSIGN_OR_RETURN(Partitions partitions,
-                   Partitions::Make(options.selector, static_cast<std::uint32_t>(store->capacity())));
+  Partitions partitions(static_cast<std::uint32_t>(store->capacity()));
   for (std::uint64_t rank = 0; rank < store->size(); ++rank) {
     const std::uint32_t slot = store->SlotOf(store->KeyAtRank(rank));
     partitions.Add(slot, store->labels(slot).advantage, store->labels(slot).source);
@@ -200,7 +199,7 @@ absl::Status PartitionedBuffer::Draw(const DrawRequest& request, const DrawBuffe
   store_->counters().sampled += drawn;
   if (store_->online_inserted() == 0) store_->counters().sampled_offline += drawn;
   draws_.Add(now_(), drawn);
-  result->total = partitions_.size(kUniform);
+  result->total = partitions_.size(kAll);
   result->plus = partitions_.size(kPlus);
   result->minus = partitions_.size(kMinus);
   result->unjudged = partitions_.size(kUnjudgedPart);

@@ -72,8 +72,8 @@ absl::Status PartitionedBuffer::CompleteSeed(const SeedRecord& record, bool pin)
 void PartitionedBuffer::ChooseSlots(int part, std::uint32_t count) {
   drawn_slots_.resize(count);
   const auto seed = static_cast<std::uint32_t>(store_->seed_held());
-  const std::uint32_t others = partitions_.size(kUniform) - seed;
-  if (part != kUniform || seed_share_ == 0 || seed == 0 || others == 0) {
+  const std::uint32_t others = partitions_.size(kAll) - seed;
+  if (part != kAll || seed_share_ == 0 || seed == 0 || others == 0) {
     for (auto& slot : drawn_slots_) slot = partitions_[part].Draw(&rng_);
     return;
   }

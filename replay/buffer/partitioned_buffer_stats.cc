@@ -26,11 +26,11 @@ BufferStats PartitionedBuffer::Stats() const {
 }
 
 void PartitionedBuffer::AddCounts(BufferStats* stats) const {
-  stats->total = partitions_.size(kUniform);
+  stats->total = partitions_.size(kAll);
   stats->plus = partitions_.size(kPlus);
   stats->minus = partitions_.size(kMinus);
   stats->unjudged = partitions_.size(kUnjudgedPart);
-  stats->seed = partitions_.seed(kUniform);
+  stats->seed = partitions_.seed(kAll);
   stats->seed_plus = partitions_.seed(kPlus);
   stats->seed_minus = partitions_.seed(kMinus);
   stats->bytes = store_->bytes();

@@ -57,7 +57,7 @@ std::string PartitionedBuffer::WhyDrawWaits(const DrawRequest& request) const {
   const std::uint64_t draws = EffectiveDraws(request);
   if (!limiter_.CanDraw(Counts(), draws)) return limiter_.WhyDrawWaits(Counts(), draws);
   const bool plus = request.counts[kPlus] > 0 && partitions_.size(kPlus) == 0;
-  return absl::StrCat("partition ", plus ? "D+" : "D-", " is empty (of ", partitions_.size(kUniform),
+  return absl::StrCat("partition ", plus ? "D+" : "D-", " is empty (of ", partitions_.size(kAll),
                       " transitions ", partitions_.size(kUnjudgedPart),
                       " are not yet judged); set allow_empty_partitions to draw without it");
 }

@@ -1,43 +1,38 @@
-// Which rows lie in D, D+ (advantage >= 0), D- (advantage <= 0) or are not yet judged, and how each is drawn
-// from.
+// Which rows lie in D, D+ (advantage >= 0), D- (advantage <= 0) or are not yet judged.
 #pragma once
 
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <memory>
-#include <utility>
 
-#include "absl/status/statusor.h"
-#include "absl/strings/string_view.h"
-#include "replay/buffer/selectors/selector.h"
+#include "replay/buffer/slot_set.h"
 #include "replay/store/writer_table.h"
 
 namespace dbr {
 
 // The parts of a draw come first.
-enum Part { kUniform = 0, kPlus = 1, kMinus = 2, kUnjudgedPart = 3 };
+enum Part { kAll = 0, kPlus = 1, kMinus = 2, kUnjudgedPart = 3 };
 inline constexpr int kDrawnParts = 3;
 inline constexpr int kAllParts = 4;
 
-// One selector for each part; every operation is as cheap as the selector's. Thread-compatible: the buffer's
-// lock guards it.
+// Every operation is O(1). Thread-compatible: the buffer's lock guards it.
 class Partitions {
  public:
-  // InvalidArgument for an unknown selector.
-  static absl::StatusOr<Partitions> Make(absl::string_view selector, std::uint32_t capacity);
+  // All parts are empty. `capacity`: of the store.
+  explicit Partitions(std::uint32_t capacity)
+      : parts_{SlotSet(capacity), SlotSet(capacity), SlotSet(capacity), SlotSet(capacity)} {}
 
   // A row with its advantage (NaN: not yet judged) enters, leaves, or has its advantage changed from
   // `old_advantage`.
   void Add(std::uint32_t slot, float advantage, Source source) {
-    selectors_[kUniform]->Insert(slot);
+    parts_[kAll].Insert(slot);
     Join(slot, advantage, source);
-    seed_[kUniform] += source == Source::kSeed;
+    seed_[kAll] += source == Source::kSeed;
   }
   void Remove(std::uint32_t slot, float advantage, Source source) {
-    selectors_[kUniform]->Remove(slot);
+    parts_[kAll].Remove(slot);
     Leave(slot, advantage, source);
-    seed_[kUniform] -= source == Source::kSeed;
+    seed_[kAll] -= source == Source::kSeed;
   }
   void Relabel(std::uint32_t slot, float old_advantage, float advantage, Source source) {
     if (Code(old_advantage) == Code(advantage)) return;
@@ -45,14 +40,11 @@ class Partitions {
     Join(slot, advantage, source);
   }
 
-  const Selector& operator[](int part) const { return *selectors_[part]; }
-  std::uint32_t size(int part) const { return selectors_[part]->size(); }
+  const SlotSet& operator[](int part) const { return parts_[part]; }
+  std::uint32_t size(int part) const { return parts_[part].size(); }
   std::uint64_t seed(int part) const { return seed_[part]; }  // rows of source seed
 
  private:
-  using Selectors = std::array<std::unique_ptr<Selector>, kAllParts>;
-  explicit Partitions(Selectors selectors) : selectors_(std::move(selectors)) {}
-
   // The parts beside D that an advantage belongs to, as bits.
   static unsigned Code(float advantage) {
     if (std::isnan(advantage)) return 1u << kUnjudgedPart;
@@ -61,19 +53,19 @@ class Partitions {
   void Join(std::uint32_t slot, float advantage, Source source) {
     for (int part = kPlus; part < kAllParts; ++part) {
       if ((Code(advantage) >> part & 1) == 0) continue;
-      selectors_[part]->Insert(slot);
+      parts_[part].Insert(slot);
       seed_[part] += source == Source::kSeed;
     }
   }
   void Leave(std::uint32_t slot, float advantage, Source source) {
     for (int part = kPlus; part < kAllParts; ++part) {
       if ((Code(advantage) >> part & 1) == 0) continue;
-      selectors_[part]->Remove(slot);
+      parts_[part].Remove(slot);
       seed_[part] -= source == Source::kSeed;
     }
   }
 
-  Selectors selectors_;
+  std::array<SlotSet, kAllParts> parts_;
   std::array<std::uint64_t, kAllParts> seed_{};
 };
 

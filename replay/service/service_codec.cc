@@ -12,9 +12,9 @@ namespace {
 constexpr std::uint64_t kMaxReplyBytes = 256 << 20;
 
 SampledPart* PartOf(int part, SampleReply* reply) {
-  return part == kUniform ? reply->mutable_uniform()
-         : part == kPlus  ? reply->mutable_plus()
-                          : reply->mutable_minus();
+  return part == kAll    ? reply->mutable_uniform()
+         : part == kPlus ? reply->mutable_plus()
+                         : reply->mutable_minus();
 }
 
 // Without writing zeros first.

@@ -55,8 +55,8 @@ struct Model {
     }
   }
   bool InPart(const Row& row, int part) const {
-    return part == kUniform || (part == kPlus && row.advantage >= 0) ||
-           (part == kMinus && row.advantage <= 0) || (part == kUnjudgedPart && std::isnan(row.advantage));
+    return part == kAll || (part == kPlus && row.advantage >= 0) || (part == kMinus && row.advantage <= 0) ||
+           (part == kUnjudgedPart && std::isnan(row.advantage));
   }
   std::uint64_t Size(int part) const {
     return static_cast<std::uint64_t>(
@@ -161,7 +161,7 @@ class BufferAgainstModel : public ::testing::TestWithParam<std::tuple<int, bool>
 
   void Compare() {
     const BufferStats stats = buffer_->Stats();
-    ASSERT_EQ(stats.total, model_.Size(kUniform));
+    ASSERT_EQ(stats.total, model_.Size(kAll));
     ASSERT_EQ(stats.plus, model_.Size(kPlus));
     ASSERT_EQ(stats.minus, model_.Size(kMinus));
     ASSERT_EQ(stats.unjudged, model_.Size(kUnjudgedPart));

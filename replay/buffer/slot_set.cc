@@ -1,4 +1,4 @@
-#include "replay/buffer/selectors/uniform.h"
+#include "replay/buffer/slot_set.h"
 
 #include <limits>
 
@@ -11,17 +11,17 @@ constexpr std::uint32_t kAbsent = std::numeric_limits<std::uint32_t>::max();
 
 }  // namespace
 
-UniformSelector::UniformSelector(std::uint32_t capacity) : places_(capacity, kAbsent) {
+SlotSet::SlotSet(std::uint32_t capacity) : places_(capacity, kAbsent) {
   members_.reserve(capacity);
 }
 
-void UniformSelector::Insert(std::uint32_t slot) {
+void SlotSet::Insert(std::uint32_t slot) {
   DBR_CHECK(slot < places_.size() && places_[slot] == kAbsent);
   places_[slot] = size();
   members_.push_back(slot);
 }
 
-void UniformSelector::Remove(std::uint32_t slot) {
+void SlotSet::Remove(std::uint32_t slot) {
   DBR_CHECK(Contains(slot));
   const std::uint32_t last = members_.back();
   members_[places_[slot]] = last;
@@ -30,12 +30,8 @@ void UniformSelector::Remove(std::uint32_t slot) {
   members_.pop_back();
 }
 
-bool UniformSelector::Contains(std::uint32_t slot) const {
+bool SlotSet::Contains(std::uint32_t slot) const {
   return slot < places_.size() && places_[slot] != kAbsent;
-}
-
-std::unique_ptr<Selector> MakeUniformSelector(std::uint32_t capacity) {
-  return std::make_unique<UniformSelector>(capacity);
 }
 
 }  // namespace dbr
