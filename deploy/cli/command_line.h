@@ -1,7 +1,6 @@
 // What the subcommands of `dbr` share.
 #pragma once
 
-#include <memory>
 #include <string>
 
 #include "absl/status/status.h"
@@ -35,12 +34,5 @@ absl::StatusOr<std::string> ProgramsFolder();
 
 // "sample", "mode", "greedy_q" or "support", in any case.
 absl::StatusOr<ActingMode> ParseActingMode(const std::string& name);
-
-// The policy in a file, or the newest one of a run folder. NotFound, DataLoss or InvalidArgument, naming the
-// file.
-absl::StatusOr<std::shared_ptr<const PolicyNetworks>> OpenPolicy(const std::string& file_or_run);
-
-// The replay server's address: given itself, or by a run folder or a socket's path.
-absl::StatusOr<std::string> ReplayAddress(const std::string& address_or_run);
 
 }  // namespace dbr

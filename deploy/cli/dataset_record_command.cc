@@ -13,11 +13,13 @@
 #include "deploy/cli/command_line.h"
 #include "deploy/cli/dataset_command.h"
 #include "deploy/cli/shipped_file.h"
+#include "deploy/launch/run_access.h"
 #include "deploy/record/recorder.h"
 #include "deploy/record/store_episodes.h"
 #include "deploy/terminal/progress_bar.h"
 #include "deploy/terminal/terminal.h"
 #include "envs/env.h"
+#include "envs/registry/registry.h"
 #include "replay/dataset/dataset_writer.h"
 
 namespace dbr {

@@ -17,9 +17,11 @@
 #include "deploy/film/film.h"
 #include "deploy/launch/result_tables.h"
 #include "deploy/launch/results.h"
+#include "deploy/launch/run_access.h"
 #include "deploy/process/interrupt.h"
 #include "deploy/terminal/terminal.h"
 #include "envs/env.h"
+#include "envs/registry/registry.h"
 #include "nn/policy.h"
 
 namespace dbr {

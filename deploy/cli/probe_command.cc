@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
+#include "deploy/launch/run_access.h"
 #include "deploy/probe/positions_file.h"
 #include "deploy/probe/probe.h"
 #include "deploy/probe/probe_report.h"

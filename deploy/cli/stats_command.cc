@@ -10,6 +10,7 @@
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
 #include "deploy/cli/stats_report.h"
+#include "deploy/launch/run_access.h"
 #include "deploy/process/interrupt.h"
 #include "deploy/terminal/terminal.h"
 #include "replay/client/client.h"

@@ -6,7 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/run_folder.h"
 #include "core/status_macros.h"
-#include "deploy/cli/command_line.h"
+#include "deploy/launch/run_access.h"
 #include "deploy/probe/probe.h"
 #include "deploy/report/board_figure.h"
 #include "deploy/report/grid.h"

@@ -11,6 +11,7 @@
 #include "deploy/cli/command_line.h"
 #include "deploy/launch/health.h"
 #include "deploy/launch/monitor.h"
+#include "deploy/launch/run_access.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/server.h"
 #include "tests/support/temp_dir.h"
