@@ -1,102 +1,63 @@
-// The floors of the house: a room includes only from floors below, and rooms of one floor are blind to each
-// other.
+// The floors of the house: docs/rooms.txt has a line a folder with what it may include, and the sources keep
+// to it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
+
+#include "tests/core/rooms.h"
 
 namespace dbr {
 namespace {
 
-struct Room {
-  std::string name;
-  int floor;
-  std::vector<std::string> prefixes;  // of the paths of its files
-};
+using testing::HasSubstr;
+using testing::IsEmpty;
 
-// Of the rooms whose prefix fits a path, the one with the longest such prefix holds it. A file in replay/ is
-// the buffer's unless it is named after a service, client or writer; one in learner/ is the runtime's unless
-// it is an algorithm's.
-const std::vector<Room>& Rooms() {
-  static const auto* rooms = new std::vector<Room>{
-      {"core", 0, {"core/"}},
-      {"config schema", 0, {"proto/config.pb.h", "proto/experiment.pb.h"}},
-      {"config reader", 1, {"proto/config_", "proto/experiment_"}},
-      {"wire", 1, {"proto/"}},
-      {"nn", 1, {"nn/"}},
-      {"envs", 1, {"envs/"}},
-      {"replay buffer", 1, {"replay/", "replay/store/writer_table"}},
-      {"offline data", 1, {"replay/dataset/"}},
-      {"algorithms", 2, {"learner/algorithm.h", "learner/algorithms/", "learner/parts/"}},
-      {"replay service",
-       2,
-       {"replay/service/service", "replay/service/replay_server", "replay/service/seed_import",
-        "replay/client/client", "replay/client/writer", "replay/client/outbox", "replay/client/await_stats"}},
-      {"actor", 3, {"actor/"}},
-      {"learner runtime", 3, {"learner/"}},
-      {"deploy", 4, {"deploy/"}},
-  };
-  return *rooms;
+constexpr std::size_t kMostSources = 30;  // of one folder, a .cc with its .h counted once
+
+std::filesystem::path Root() {
+  return DBR_SOURCE_DIR;
 }
 
-// Whether `included` opens onto network, clock or files.
-bool IsOutsideWorld(const std::string& included) {
-  static const auto* headers = new std::set<std::string>{
-      "absl/time/clock.h", "chrono",   "ctime",          "fstream",           "filesystem",
-      "fcntl.h",           "unistd.h", "core/file_io.h", "core/run_folder.h", "core/shutdown.h"};
-  return headers->count(included) > 0 || included.rfind("grpcpp/", 0) == 0 ||
-         included.find(".grpc.pb.h") != std::string::npos;
+std::string ReadAll(const std::filesystem::path& path) {
+  std::ifstream stream(path);
+  std::stringstream text;
+  text << stream.rdbuf();
+  return text.str();
 }
 
-const Room* RoomOf(const std::string& path) {
-  const Room* best = nullptr;
-  std::size_t longest = 0;
-  for (const Room& room : Rooms()) {
-    for (const std::string& prefix : room.prefixes) {
-      if (path.rfind(prefix, 0) == 0 && prefix.size() > longest) {
-        longest = prefix.size();
-        best = &room;
-      }
+Rooms TheRooms() {
+  std::vector<std::string> errors;
+  Rooms rooms = ParseRooms(ReadAll(Root() / "docs/rooms.txt"), &errors);
+  EXPECT_THAT(errors, IsEmpty());
+  return rooms;
+}
+
+// The sources, by paths from the root.
+std::vector<std::string> Sources() {
+  std::vector<std::string> paths;
+  for (const char* top : {"core", "proto", "nn", "envs", "replay", "learner", "actor", "deploy"}) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(Root() / top)) {
+      const auto extension = entry.path().extension();
+      if (extension == ".h" || extension == ".cc")
+        paths.push_back(entry.path().lexically_relative(Root()).generic_string());
     }
   }
-  return best;
-}
-
-bool IsMain(const std::string& path) {
-  return std::filesystem::path(path).filename() == "main.cc";
-}
-
-std::string Describe(const Room& room) {
-  return room.name + ", floor " + std::to_string(room.floor);
-}
-
-// Why the file at `path` may not include `included`; "" where it may.
-std::string Violation(const std::string& path, const std::string& included) {
-  if (IsMain(path)) return "";
-  const Room* from = RoomOf(path);
-  if (from == nullptr) return path + " belongs to no room";
-  if (from->name == "algorithms" && IsOutsideWorld(included)) {
-    return path + " (" + Describe(*from) + ") includes " + included + ": no network, clock or file there";
-  }
-  if (from->floor <= 1 && from->name != "wire" && included.rfind("grpcpp/", 0) == 0) {
-    return path + " (" + Describe(*from) + ") includes " + included + ": no gRPC there";
-  }
-  const Room* to = RoomOf(included);
-  if (included.rfind("tests/", 0) == 0) return path + " includes " + included + ": tests are above all rooms";
-  if (to == nullptr || to == from || to->floor < from->floor) return "";
-  return path + " (" + Describe(*from) + ") includes " + included + " (" + Describe(*to) +
-         "): a room includes only from floors below (rooms are listed in this test)";
+  EXPECT_GT(paths.size(), 200) << "the sources were not found under " << Root();
+  return paths;
 }
 
 // The "path" or <path> of every line that begins with #include.
-std::vector<std::string> IncludesOf(const std::filesystem::path& file) {
+std::vector<std::string> IncludesOf(const std::string& path) {
   const std::string directive = "#include ";
   std::vector<std::string> includes;
-  std::ifstream stream(file);
+  std::ifstream stream(Root() / path);
   for (std::string line; std::getline(stream, line);) {
     const std::size_t end = line.find_first_of("\">", directive.size() + 1);
     if (line.rfind(directive, 0) != 0 || end == std::string::npos) continue;
@@ -105,54 +66,129 @@ std::vector<std::string> IncludesOf(const std::filesystem::path& file) {
   return includes;
 }
 
-TEST(FloorsTest, EverySourceIncludesOnlyFromFloorsBelow) {
-  const std::filesystem::path root = DBR_SOURCE_DIR;
-  int files = 0, includes = 0;
-  for (const char* folder : {"core", "proto", "nn", "envs", "replay", "learner", "actor", "deploy"}) {
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(root / folder)) {
-      const auto extension = entry.path().extension();
-      if (extension != ".h" && extension != ".cc") continue;
-      const std::string path = entry.path().lexically_relative(root).generic_string();
-      ++files;
-      for (const std::string& included : IncludesOf(entry.path())) {
-        ++includes;
-        EXPECT_EQ(Violation(path, included), "");
-      }
+TEST(FloorsTest, EverySourceIncludesOnlyWhatItsFolderMay) {
+  const Rooms rooms = TheRooms();
+  std::size_t includes = 0;
+  for (const std::string& path : Sources()) {
+    for (const std::string& included : IncludesOf(path)) {
+      ++includes;
+      EXPECT_EQ(Violation(rooms, path, included), "");
     }
   }
-  EXPECT_GT(includes, 2 * files);
-  EXPECT_GT(files, 50) << "the sources were not found under " << root;
+  EXPECT_GT(includes, 400);
 }
 
-TEST(FloorsTest, FindsEachKindOfViolation) {
-  using testing::HasSubstr;
-  EXPECT_THAT(Violation("core/rng.h", "nn/mlp.h"), HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("nn/mlp.cc", "envs/env.h"), HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("replay/buffer/partitioned_buffer.cc", "proto/rpc/codec.h"),
-              HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("replay/store/writer_table.h", "replay/service/service.h"),
-              HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("replay/buffer/selectors/uniform.cc", "grpcpp/grpcpp.h"), HasSubstr("no gRPC"));
-  EXPECT_THAT(Violation("learner/algorithms/discrete_dbr.cc", "learner/runtime/trainer.h"),
-              HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("learner/training/twin_critic.h", "replay/client/client.h"),
-              HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("learner/algorithm.h", "absl/time/clock.h"), HasSubstr("no network, clock or file"));
-  EXPECT_THAT(Violation("actor/step_loop.cc", "learner/runtime/trainer.h"),
-              HasSubstr("only from floors below"));
-  EXPECT_THAT(Violation("core/rng.h", "tests/support/temp_dir.h"), HasSubstr("tests are above"));
-  EXPECT_THAT(Violation("elsewhere/file.cc", "core/rng.h"), HasSubstr("no room"));
+TEST(FloorsTest, NoFoldersIncludeEachOtherInACircle) {
+  EXPECT_EQ(FindCircle(TheRooms()), "");
 }
 
-TEST(FloorsTest, AllowsWhatTheHouseAllows) {
-  EXPECT_EQ(Violation("learner/algorithms/discrete_dbr.cc", "proto/config.pb.h"), "");
-  EXPECT_EQ(Violation("learner/algorithms/discrete_dbr.cc", "nn/mlp.h"), "");
-  EXPECT_EQ(Violation("replay/service/service.cc", "replay/buffer/partitioned_buffer.h"), "");
-  EXPECT_EQ(Violation("replay/client/writer.cc", "proto/rpc/codec.h"), "");
-  EXPECT_EQ(Violation("actor/step_loop.cc", "replay/client/writer.h"), "");
-  EXPECT_EQ(Violation("learner/runtime/trainer.cc", "learner/algorithm.h"), "");
-  EXPECT_EQ(Violation("learner/runtime/main.cc", "learner/runtime/trainer.h"), "");
-  EXPECT_EQ(Violation("core/file_io.cc", "fcntl.h"), "");
+TEST(FloorsTest, EveryFolderHasALineAndEveryLineAFolder) {
+  const Rooms rooms = TheRooms();
+  std::set<std::string> folders = {"proto"};  // holds schemas alone
+  for (const std::string& path : Sources())
+    folders.insert(std::filesystem::path(path).parent_path().generic_string());
+  for (const auto& [folder, room] : rooms) EXPECT_EQ(folders.count(folder), 1) << folder << " has no sources";
+  for (const std::string& folder : folders) EXPECT_EQ(rooms.count(folder), 1) << folder << " has no line";
+}
+
+// A folder may include what is listed because some file of it does.
+TEST(FloorsTest, EveryLineAllowsOnlyWhatIsUsed) {
+  std::map<std::string, std::set<std::string>> used;
+  for (const std::string& path : Sources()) {
+    if (std::filesystem::path(path).filename() == "main.cc") continue;
+    std::set<std::string>& of_folder = used[std::filesystem::path(path).parent_path().generic_string()];
+    for (const std::string& included : IncludesOf(path)) {
+      of_folder.insert(std::filesystem::path(included).parent_path().generic_string());
+      of_folder.insert(OutsideWorld(included));
+    }
+  }
+  used["proto"].insert("grpc");  // the generated services
+  for (const auto& [folder, room] : TheRooms()) {
+    for (const std::string& allowed : room.may_include)
+      EXPECT_EQ(used[folder].count(allowed), 1) << folder << " may include " << allowed << " and does not";
+  }
+}
+
+TEST(FloorsTest, NoFolderHoldsMoreThanAFewDozenSources) {
+  std::map<std::string, std::set<std::string>> units;
+  for (const std::string& path : Sources()) {
+    const std::filesystem::path source(path);
+    units[source.parent_path().generic_string()].insert(source.stem().string());
+  }
+  for (const auto& [folder, names] : units) EXPECT_LE(names.size(), kMostSources) << folder;
+}
+
+// To draw it anew: DBR_UPDATE_DOCS=1 build/tests/floors_test
+TEST(FloorsTest, ThePictureInTheDocsIsOfThisTable) {
+  const std::filesystem::path path = Root() / "docs/pictures/rooms.svg";
+  const std::string picture = DrawRooms(TheRooms());
+  if (std::getenv("DBR_UPDATE_DOCS") != nullptr) std::ofstream(path) << picture;
+  EXPECT_TRUE(ReadAll(path) == picture)
+      << path << " is not what docs/rooms.txt says; draw it anew: DBR_UPDATE_DOCS=1 build/tests/floors_test";
+}
+
+Rooms Small() {
+  std::vector<std::string> errors;
+  Rooms rooms = ParseRooms(
+      "# a comment\n\n"
+      "core | files | values\n"
+      "nn | core | networks\n"
+      "envs | core | worlds\n"
+      "actor | core nn envs grpc clock | acting\n",
+      &errors);
+  EXPECT_THAT(errors, IsEmpty());
+  return rooms;
+}
+
+TEST(RoomsTest, FindsEachKindOfViolation) {
+  const Rooms rooms = Small();
+  EXPECT_THAT(Violation(rooms, "core/rng.h", "nn/mlp.h"), HasSubstr("nothing of nn there"));
+  EXPECT_THAT(Violation(rooms, "nn/mlp.cc", "envs/env.h"), HasSubstr("nothing of envs there"));
+  EXPECT_THAT(Violation(rooms, "nn/mlp.cc", "grpcpp/grpcpp.h"), HasSubstr("no grpc there"));
+  EXPECT_THAT(Violation(rooms, "nn/mlp.cc", "proto/replay.grpc.pb.h"), HasSubstr("no grpc there"));
+  EXPECT_THAT(Violation(rooms, "envs/env.cc", "absl/time/clock.h"), HasSubstr("no clock there"));
+  EXPECT_THAT(Violation(rooms, "actor/step_loop.cc", "core/file_io.h"), HasSubstr("no files there"));
+  EXPECT_THAT(Violation(rooms, "core/rng.h", "tests/support/temp_dir.h"), HasSubstr("tests are above"));
+  EXPECT_THAT(Violation(rooms, "elsewhere/file.cc", "core/rng.h"), HasSubstr("no line for elsewhere"));
+  EXPECT_THAT(Violation(rooms, "nn/deeper/file.cc", "core/rng.h"), HasSubstr("no line for nn/deeper"));
+}
+
+TEST(RoomsTest, AllowsWhatTheTableAllows) {
+  const Rooms rooms = Small();
+  EXPECT_EQ(Violation(rooms, "nn/mlp.cc", "core/rng.h"), "");
+  EXPECT_EQ(Violation(rooms, "nn/mlp.cc", "nn/product.h"), "");
+  EXPECT_EQ(Violation(rooms, "nn/mlp.cc", "vector"), "");
+  EXPECT_EQ(Violation(rooms, "actor/step_loop.cc", "grpcpp/grpcpp.h"), "");
+  EXPECT_EQ(Violation(rooms, "core/file_io.cc", "fcntl.h"), "");
+  EXPECT_EQ(Violation(rooms, "core/main.cc", "actor/actor.h"), "");
+}
+
+TEST(RoomsTest, FindsACircleAndNamesItsFolders) {
+  std::vector<std::string> errors;
+  const Rooms rooms = ParseRooms("a | b | one\nb | c | two\nc | d b | three\nd | | four\n", &errors);
+  EXPECT_THAT(errors, IsEmpty());
+  EXPECT_EQ(FindCircle(rooms), "b -> c -> b");
+  EXPECT_EQ(FindCircle(Small()), "");
+}
+
+TEST(RoomsTest, DescribesEachLineThatItCannotRead) {
+  std::vector<std::string> errors;
+  ParseRooms("core | files\nnn | cores | networks\nnn | | networks\n", &errors);
+  EXPECT_THAT(errors, testing::ElementsAre(HasSubstr("found 'core | files'"), HasSubstr("nn has two lines"),
+                                           HasSubstr("cores, which has no line")));
+}
+
+TEST(RoomsTest, ARoomStandsAboveAllThatItIncludes) {
+  EXPECT_THAT(FloorsOf(Small()),
+              testing::UnorderedElementsAre(testing::Pair("core", 0), testing::Pair("nn", 1),
+                                            testing::Pair("envs", 1), testing::Pair("actor", 2)));
+}
+
+TEST(RoomsTest, DrawsEachRoomAndLeavesOutArrowsThatFollowFromOthers) {
+  const std::string picture = DrawRooms(Small());
+  for (const char* folder : {"core", "nn", "envs", "actor"}) EXPECT_THAT(picture, HasSubstr(folder));
+  EXPECT_THAT(picture, HasSubstr("actor -&gt; nn"));
+  EXPECT_THAT(picture, testing::Not(HasSubstr("actor -&gt; core")));
 }
 
 }  // namespace
