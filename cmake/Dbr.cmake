@@ -20,11 +20,13 @@ endif()
 option(DBR_WERROR "Treat warnings as errors" OFF)
 option(DBR_TESTS "Build the tests" ON)
 option(DBR_BENCH "Build the benchmark program" ON)
+option(DBR_PCH "Read the libraries' large headers once, precompiled (off: each source stands on its own includes)" ON)
 set(DBR_SANITIZE "" CACHE STRING "address;undefined or thread")
 
 find_program(CCACHE ccache)
 if(CCACHE)
-  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+  # Without this ccache does not look at sources that use a precompiled header.
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${CCACHE})
 endif()
 
 add_library(dbr_flags INTERFACE)
@@ -34,6 +36,9 @@ if(DBR_ARCH)
   target_compile_options(dbr_flags INTERFACE -march=${DBR_ARCH})
 endif()
 target_compile_options(dbr_flags INTERFACE -fno-math-errno)
+# These macros are the same for all, or no source could read a header that another target precompiled.
+target_compile_options(dbr_flags INTERFACE -pthread)
+target_compile_definitions(dbr_flags INTERFACE $<TARGET_PROPERTY:spdlog::spdlog,INTERFACE_COMPILE_DEFINITIONS>)
 foreach(sanitizer IN LISTS DBR_SANITIZE)
   target_compile_options(dbr_flags INTERFACE -fsanitize=${sanitizer} -fno-omit-frame-pointer)
   target_link_options(dbr_flags INTERFACE -fsanitize=${sanitizer})
@@ -48,11 +53,45 @@ if(DBR_WERROR)
   target_compile_options(dbr_warnings INTERFACE -Werror)
 endif()
 
-# dbr_library(NAME SRCS a.cc b.cc DEPS public_libs... PRIVATE_DEPS libs...)
+# Precompiled headers: the large headers of libraries that many sources include. A source still includes what it uses; builds
+# with DBR_PCH off (the thread-safety preset, clang-tidy) find what it forgets.
+set(DBR_PCH_PLAIN <algorithm> <array> <atomic> <cmath> <cstdint> <cstring> <functional> <map> <memory> <optional> <string>
+  <utility> <vector> <absl/status/status.h> <absl/status/statusor.h> <absl/strings/str_cat.h> <absl/strings/str_join.h>
+  <absl/synchronization/mutex.h> <absl/time/time.h> <absl/types/span.h> <Eigen/Core>)
+set(DBR_PCH_RPC ${DBR_PCH_PLAIN} <grpcpp/grpcpp.h> <spdlog/spdlog.h>)
+set(DBR_PCH_TEST ${DBR_PCH_PLAIN} <filesystem> <fstream> <map> <set> <sstream> <thread> <gmock/gmock.h> <gtest/gtest.h>
+  <nlohmann/json.hpp>)
+
+# dbr_precompile(NAME): makes the precompiled header that targets of the kind NAME (plain, rpc or test) share.
+function(dbr_precompile kind)
+  cmake_parse_arguments(ARG "EXECUTABLE" "" "DEPS" ${ARGN})
+  string(TOUPPER ${kind} upper)
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/pch/${kind}.cc CONTENT "int main() { return 0; }\n")
+  if(ARG_EXECUTABLE)  # programs are compiled with -fPIE, libraries with -fPIC; one cannot read what the other precompiled
+    add_executable(dbr_pch_${kind} EXCLUDE_FROM_ALL ${PROJECT_BINARY_DIR}/pch/${kind}.cc)
+  else()
+    add_library(dbr_pch_${kind} OBJECT EXCLUDE_FROM_ALL ${PROJECT_BINARY_DIR}/pch/${kind}.cc)
+  endif()
+  target_link_libraries(dbr_pch_${kind} PRIVATE dbr_flags dbr_warnings ${ARG_DEPS})
+  target_precompile_headers(dbr_pch_${kind} PRIVATE ${DBR_PCH_${upper}})
+endfunction()
+
+# Has the target NAME read the precompiled header of a kind ("none": none).
+function(dbr_use_precompiled name kind)
+  if(DBR_PCH AND NOT kind STREQUAL "none")
+    target_precompile_headers(${name} REUSE_FROM dbr_pch_${kind})
+  endif()
+endfunction()
+
+# dbr_library(NAME SRCS a.cc b.cc DEPS public_libs... PRIVATE_DEPS libs... PCH rpc)
 function(dbr_library name)
-  cmake_parse_arguments(ARG "" "" "SRCS;DEPS;PRIVATE_DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "" "PCH" "SRCS;DEPS;PRIVATE_DEPS" ${ARGN})
   add_library(${name} STATIC ${ARG_SRCS})
   target_link_libraries(${name} PUBLIC dbr_flags ${ARG_DEPS} PRIVATE dbr_warnings ${ARG_PRIVATE_DEPS})
+  if(NOT ARG_PCH)
+    set(ARG_PCH plain)
+  endif()
+  dbr_use_precompiled(${name} ${ARG_PCH})
 endfunction()
 
 # dbr_binary(NAME SRCS main.cc DEPS libs...): a program in build/bin.
@@ -78,6 +117,7 @@ function(dbr_test name)
     DBR_DEFAULT_REFERENCE_DIR="${PROJECT_SOURCE_DIR}/tests/reference"
     DBR_BIN_DIR="${CMAKE_RUNTIME_OUTPUT_DIRECTORY}"
     DBR_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  dbr_use_precompiled(${name} test)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}" ENVIRONMENT "OPENBLAS_NUM_THREADS=1")
