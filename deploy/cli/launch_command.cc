@@ -50,7 +50,7 @@ void AddLaunch(CLI::App* app, int* exit_code) {
   command->add_flag("--resume", flags->options.resume, "Continue the run in --run-dir");
   command
       ->add_option("--seed-buffer", flags->options.seed_buffer,
-                   "HDF5 file of offline data that the replay server begins with (replay.seed.path)")
+                   "HDF5 file of offline data that the replay server begins with (replay.seed_buffer.path)")
       ->type_name("FILE");
   command
       ->add_option("--seed-layout", flags->options.seed_layout,

@@ -24,7 +24,7 @@ std::string Percent(double share) {
 }
 
 const char* SourceName(TransitionSource source) {
-  return source == SEED ? "seed" : "online";
+  return source == SEED_BUFFER ? "seed_buffer" : "online";
 }
 
 std::string SizeLine(const char* name, std::uint64_t size, std::uint64_t whole, absl::string_view of) {
@@ -99,16 +99,16 @@ std::string SourceLine(const char* name, std::uint64_t of_d, std::uint64_t of_pl
 std::string Sources(const StatsReply& stats) {
   std::string text =
       absl::StrCat("\nsources\n",
-                   SourceLine("online", stats.total() - stats.seed(), stats.plus() - stats.seed_plus(),
-                              stats.minus() - stats.seed_minus(), stats),
-                   SourceLine("seed", stats.seed(), stats.seed_plus(), stats.seed_minus(), stats));
-  if (stats.seed_rows() == 0) return text;
-  absl::StrAppend(&text, "             ", WithCommas(stats.seed_rows()), " transitions came in at ",
-                  Compact(stats.seed_rows_per_second()), " rows/s, ", WithCommas(stats.seed_bad_rows()),
-                  " bad rows left out;\n             ", WithCommas(stats.seed_episodes()),
-                  " whole episodes with a return of ", Fixed(stats.seed_return_mean(), 1), " ± ",
-                  Fixed(stats.seed_return_std(), 1), " (", Fixed(stats.seed_return_min(), 1), " to ",
-                  Fixed(stats.seed_return_max(), 1), ")\n");
+                   SourceLine("online", stats.total() - stats.seed_buffer(), stats.plus() - stats.seed_buffer_plus(),
+                              stats.minus() - stats.seed_buffer_minus(), stats),
+                   SourceLine("seed_buffer", stats.seed_buffer(), stats.seed_buffer_plus(), stats.seed_buffer_minus(), stats));
+  if (stats.seed_buffer_rows() == 0) return text;
+  absl::StrAppend(&text, "             ", WithCommas(stats.seed_buffer_rows()), " transitions came in at ",
+                  Compact(stats.seed_buffer_rows_per_second()), " rows/s, ", WithCommas(stats.seed_buffer_bad_rows()),
+                  " bad rows left out;\n             ", WithCommas(stats.seed_buffer_episodes()),
+                  " whole episodes with a return of ", Fixed(stats.seed_buffer_return_mean(), 1), " ± ",
+                  Fixed(stats.seed_buffer_return_std(), 1), " (", Fixed(stats.seed_buffer_return_min(), 1), " to ",
+                  Fixed(stats.seed_buffer_return_max(), 1), ")\n");
   return text;
 }
 
@@ -121,7 +121,7 @@ std::string Writers(const StatsReply& stats) {
                     PadLeft(WithCommas(writer.inserted()), 12), PadLeft(WithCommas(writer.held()), 12), " ",
                     Percent(Ratio(writer.held(), stats.total())),
                     PadLeft(WithCommas(writer.duplicates()), 12), PadLeft(WithCommas(writer.refused()), 10),
-                    writer.connected() || writer.source() == SEED ? "" : "   gone", "\n");
+                    writer.connected() || writer.source() == SEED_BUFFER ? "" : "   gone", "\n");
   }
   return text;
 }
@@ -176,20 +176,20 @@ Json SourcesJson(const StatsReply& stats) {
                 {"plus_share", Ratio(plus, stats.plus())},
                 {"minus_share", Ratio(minus, stats.minus())}};
   };
-  return {{"online", source(stats.total() - stats.seed(), stats.plus() - stats.seed_plus(),
-                            stats.minus() - stats.seed_minus())},
-          {"seed", source(stats.seed(), stats.seed_plus(), stats.seed_minus())}};
+  return {{"online", source(stats.total() - stats.seed_buffer(), stats.plus() - stats.seed_buffer_plus(),
+                            stats.minus() - stats.seed_buffer_minus())},
+          {"seed_buffer", source(stats.seed_buffer(), stats.seed_buffer_plus(), stats.seed_buffer_minus())}};
 }
 
-Json SeedJson(const StatsReply& stats) {
-  return {{"seed_rows", stats.seed_rows()},
-          {"seed_bad_rows", stats.seed_bad_rows()},
-          {"seed_episodes", stats.seed_episodes()},
-          {"seed_return_mean", Number(stats.seed_return_mean())},
-          {"seed_return_std", Number(stats.seed_return_std())},
-          {"seed_return_min", Number(stats.seed_return_min())},
-          {"seed_return_max", Number(stats.seed_return_max())},
-          {"seed_rows_per_second", Number(stats.seed_rows_per_second())}};
+Json SeedBufferJson(const StatsReply& stats) {
+  return {{"seed_buffer_rows", stats.seed_buffer_rows()},
+          {"seed_buffer_bad_rows", stats.seed_buffer_bad_rows()},
+          {"seed_buffer_episodes", stats.seed_buffer_episodes()},
+          {"seed_buffer_return_mean", Number(stats.seed_buffer_return_mean())},
+          {"seed_buffer_return_std", Number(stats.seed_buffer_return_std())},
+          {"seed_buffer_return_min", Number(stats.seed_buffer_return_min())},
+          {"seed_buffer_return_max", Number(stats.seed_buffer_return_max())},
+          {"seed_buffer_rows_per_second", Number(stats.seed_buffer_rows_per_second())}};
 }
 
 Json EdgesJson(const StatsReply& stats) {
@@ -237,9 +237,9 @@ Json ToJson(const StatsReply& stats) {
                {"relabel_stale", stats.relabel_stale()},
                {"refused", stats.refused()},
                {"duplicates", stats.duplicates()},
-               {"seed", stats.seed()},
-               {"seed_plus", stats.seed_plus()},
-               {"seed_minus", stats.seed_minus()},
+               {"seed_buffer", stats.seed_buffer()},
+               {"seed_buffer_plus", stats.seed_buffer_plus()},
+               {"seed_buffer_minus", stats.seed_buffer_minus()},
                {"sampled_offline", stats.sampled_offline()},
                {"capacity", stats.capacity()},
                {"bytes", stats.bytes()},
@@ -256,7 +256,7 @@ Json ToJson(const StatsReply& stats) {
                {"uptime_s", Number(stats.uptime_s())}};
   json["advantage_edges"] = EdgesJson(stats);
   json["advantage_histogram"] = stats.advantage_histogram();
-  json.update(SeedJson(stats));
+  json.update(SeedBufferJson(stats));
   json["sources"] = SourcesJson(stats);
   json["writers"] = WritersJson(stats);
   json["blocked"] = BlockedJson(stats);

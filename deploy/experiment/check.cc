@@ -138,8 +138,8 @@ std::string WrongMeasure(const Task& task, const Config& config, const EnvSpec& 
 
 // Whether a task of kind OFFLINE is one; "" where it is.
 std::string WrongOffline(const Config& config) {
-  if (config.replay().seed().path().empty())
-    return "replay.seed.path: expected the seed buffer of an offline task, found none";
+  if (config.replay().seed_buffer().path().empty())
+    return "replay.seed_buffer.path: expected the seed buffer of an offline task, found none";
   if (TrainsOfflineAlone(config)) return "";
   return absl::StrCat("expected an offline task to have learner.max_updates of 1 to ",
                       "learner.offline_updates, so that no actor acts, found ",
@@ -214,7 +214,7 @@ void FindCellErrors(const Experiment& experiment, const std::vector<Cell>& cells
                     std::vector<std::string>* errors) {
   std::set<std::string> missing;
   for (const Cell& cell : cells) {
-    const std::string& path = cell.config.replay().seed().path();
+    const std::string& path = cell.config.replay().seed_buffer().path();
     if (path.empty() || std::filesystem::exists(path)) continue;
     if (ReadStanding(cell).state != CellState::kNew || !missing.insert(path).second) continue;
     errors->push_back(absl::StrCat("task '", cell.task, "': expected its seed buffer, found no file '", path,

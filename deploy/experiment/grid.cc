@@ -146,9 +146,9 @@ Config MergedConfig(const Experiment& experiment, const Task& task, const Conten
   config.MergeFrom(OfKind(scale, task.kind()));
   if (config.algorithm().algorithm_case() == AlgorithmConfig::ALGORITHM_NOT_SET)
     config.mutable_algorithm()->mutable_dbr();
-  if (!config.replay().seed().path().empty()) {
-    const std::filesystem::path path = std::filesystem::path(data) / config.replay().seed().path();
-    config.mutable_replay()->mutable_seed()->set_path(
+  if (!config.replay().seed_buffer().path().empty()) {
+    const std::filesystem::path path = std::filesystem::path(data) / config.replay().seed_buffer().path();
+    config.mutable_replay()->mutable_seed_buffer()->set_path(
         std::filesystem::absolute(path).lexically_normal().string());
   }
   return config;

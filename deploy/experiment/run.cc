@@ -28,8 +28,8 @@ bool WasStopped(int wait_status) {
 }
 
 // Before what stands in the cell's place is moved away for a run that could not begin.
-absl::Status CheckSeedIsThere(const Cell& cell) {
-  const std::string& path = cell.config.replay().seed().path();
+absl::Status CheckSeedBufferIsThere(const Cell& cell) {
+  const std::string& path = cell.config.replay().seed_buffer().path();
   std::error_code ignored;
   if (path.empty() || std::filesystem::exists(path, ignored)) return absl::OkStatus();
   return absl::NotFoundError(
@@ -137,7 +137,7 @@ absl::Status ExperimentRun::Start(Entry* entry) {
   const bool resume = standing.state == CellState::kInterrupted || standing.state == CellState::kFailed;
   entry->before = resume ? standing.summary : RunSummary();
   if (!resume) {
-    RETURN_IF_ERROR(CheckSeedIsThere(cell));
+    RETURN_IF_ERROR(CheckSeedBufferIsThere(cell));
     ASSIGN_OR_RETURN(const std::string aside, MoveAside(cell, run_dir_));
     if (!aside.empty()) board_.Say(absl::StrCat(cell.name(), ": what was there is now in ", aside));
   }

@@ -24,7 +24,7 @@ namespace {
 constexpr absl::Duration kAskEvery = absl::Milliseconds(500);
 constexpr absl::Duration kLineEvery = absl::Seconds(10);     // where the output is no terminal
 constexpr absl::Duration kServingWithin = absl::Minutes(2);  // a large store takes its time to be opened
-constexpr absl::Duration kServingSeedWithin = absl::Minutes(10);
+constexpr absl::Duration kServingSeedBufferWithin = absl::Minutes(10);
 constexpr absl::Duration kFirstAnswerWithin = absl::Seconds(10);
 constexpr absl::Duration kLastAnswerWithin = absl::Seconds(2);
 
@@ -83,7 +83,7 @@ Launch::Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_p
   summary_.seed = plan_.config.seed();
   summary_.config = plan_.config_source;
   summary_.commit = BuildCommit();
-  summary_.seed_buffer.path = plan_.config.replay().seed().path();
+  summary_.seed_buffer.path = plan_.config.replay().seed_buffer().path();
   summary_.offline_updates = plan_.config.learner().offline_updates();
   summary_.every_updates = plan_.config.evaluation().every_updates();
   summary_.ended = "running";
@@ -142,7 +142,7 @@ absl::Status Launch::StartAll() {
   ASSIGN_OR_RETURN(supervisor_, Supervisor::Create(std::move(options)));
   supervisor_->set_restarting(false);
   const absl::Duration replay_within =
-      summary_.seed_buffer.path.empty() ? kServingWithin : kServingSeedWithin;
+      summary_.seed_buffer.path.empty() ? kServingWithin : kServingSeedBufferWithin;
   for (ProcessSpec& process : Services(plan_, programs_)) {
     const std::string name = process.name;
     RETURN_IF_ERROR(supervisor_->Start(std::move(process)));
@@ -155,7 +155,7 @@ absl::Status Launch::StartAll() {
   monitor_ = std::make_unique<RunMonitor>(plan_.replay_address, plan_.learner_address, kAskEvery,
                                           [supervisor = supervisor_.get()] { supervisor->Wake(); });
   training_since_ = absl::Now();
-  TellOfTheSeed();
+  TellOfTheSeedBuffer();
   return absl::OkStatus();
 }
 
@@ -166,16 +166,16 @@ absl::Status Launch::StartActors() {
   return absl::OkStatus();
 }
 
-void Launch::TellOfTheSeed() {
+void Launch::TellOfTheSeedBuffer() {
   summary_.Update(monitor_->Ask(kFirstAnswerWithin));
-  const SeedSummary& seed = summary_.seed_buffer;
-  if (seed.rows == 0) return;
-  Say(absl::StrCat("the seed holds ", WithCommas(seed.rows), " transitions, ", WithCommas(seed.episodes),
-                   " whole episodes with a mean return of ", Fixed(seed.return_mean, 1), " ± ",
-                   Fixed(seed.return_std, 1), "; it was loaded at ", Compact(seed.rows_per_second),
+  const SeedBufferSummary& seed_buffer = summary_.seed_buffer;
+  if (seed_buffer.rows == 0) return;
+  Say(absl::StrCat("the seed buffer holds ", WithCommas(seed_buffer.rows), " transitions, ", WithCommas(seed_buffer.episodes),
+                   " whole episodes with a mean return of ", Fixed(seed_buffer.return_mean, 1), " ± ",
+                   Fixed(seed_buffer.return_std, 1), "; it was loaded at ", Compact(seed_buffer.rows_per_second),
                    " rows/s"));
-  if (seed.bad_rows > 0)
-    Say(absl::StrCat(WithCommas(seed.bad_rows), " rows with values that are not finite are left out"));
+  if (seed_buffer.bad_rows > 0)
+    Say(absl::StrCat(WithCommas(seed_buffer.bad_rows), " rows with values that are not finite are left out"));
 }
 
 // OK also where a stop signal came first.

@@ -38,7 +38,7 @@ class Launch {
   void Announce();
   absl::Status StartAll();
   absl::Status StartActors();
-  void TellOfTheSeed();
+  void TellOfTheSeedBuffer();
   absl::Status WaitUntilServing(const std::string& name, const std::string& address, absl::Duration within);
   // Watching (launch_watch.cc).
   absl::Status Train();

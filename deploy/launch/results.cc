@@ -45,12 +45,12 @@ Json ToJson(const std::optional<EvaluationPoint>& point) {
   return point.has_value() ? ToJson(*point) : Json(nullptr);
 }
 
-Json SeedJson(const SeedSummary& seed) {
-  Json returns = {{"mean", Number(seed.return_mean)}};
-  returns.update(Spread(seed.return_std, seed.return_min, seed.return_max));
-  return {{"path", seed.path},         {"rows", seed.rows},
-          {"bad_rows", seed.bad_rows}, {"episodes", seed.episodes},
-          {"return", returns},         {"rows_per_second", Number(seed.rows_per_second)}};
+Json SeedBufferJson(const SeedBufferSummary& seed_buffer) {
+  Json returns = {{"mean", Number(seed_buffer.return_mean)}};
+  returns.update(Spread(seed_buffer.return_std, seed_buffer.return_min, seed_buffer.return_max));
+  return {{"path", seed_buffer.path},         {"rows", seed_buffer.rows},
+          {"bad_rows", seed_buffer.bad_rows}, {"episodes", seed_buffer.episodes},
+          {"return", returns},         {"rows_per_second", Number(seed_buffer.rows_per_second)}};
 }
 
 Json ReturnsJson(const RunSummary& summary) {
@@ -61,7 +61,7 @@ Json ReturnsJson(const RunSummary& summary) {
     end["steps"] = summary.transitions;
     end["episodes"] = summary.final_results[0].episodes;
   }
-  return {{"seed", Number(summary.seed_buffer.return_mean)},
+  return {{"seed_buffer", Number(summary.seed_buffer.return_mean)},
           {"after_offline", ToJson(summary.AfterOffline())},
           {"lowest_online", ToJson(summary.curve.LowestOnline())},
           {"end", end}};
@@ -91,14 +91,14 @@ std::vector<EvaluationPoint> RunSummary::Update(const RunSample& sample) {
     const StatsReply& replay = *sample.replay;
     games = replay.episodes();
     transitions = replay.inserted();
-    seed_buffer.rows = replay.seed_rows();
-    seed_buffer.bad_rows = replay.seed_bad_rows();
-    seed_buffer.episodes = replay.seed_episodes();
-    seed_buffer.return_mean = replay.seed_return_mean();
-    seed_buffer.return_std = replay.seed_return_std();
-    seed_buffer.return_min = replay.seed_return_min();
-    seed_buffer.return_max = replay.seed_return_max();
-    seed_buffer.rows_per_second = replay.seed_rows_per_second();
+    seed_buffer.rows = replay.seed_buffer_rows();
+    seed_buffer.bad_rows = replay.seed_buffer_bad_rows();
+    seed_buffer.episodes = replay.seed_buffer_episodes();
+    seed_buffer.return_mean = replay.seed_buffer_return_mean();
+    seed_buffer.return_std = replay.seed_buffer_return_std();
+    seed_buffer.return_min = replay.seed_buffer_return_min();
+    seed_buffer.return_max = replay.seed_buffer_return_max();
+    seed_buffer.rows_per_second = replay.seed_buffer_rows_per_second();
   }
   if (sample.learner.has_value()) {
     updates = sample.learner->updates();
@@ -130,7 +130,7 @@ absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder) {
                {"ended", summary.ended}};
   if (!summary.failure.empty()) json["failure"] = summary.failure;
   if (summary.seed_buffer.rows > 0) {
-    json["seed_buffer"] = SeedJson(summary.seed_buffer);
+    json["seed_buffer"] = SeedBufferJson(summary.seed_buffer);
     json["offline_updates"] = summary.offline_updates;
     json["returns"] = ReturnsJson(summary);
   }
@@ -154,7 +154,7 @@ RunSummary ReadSummary(const RunFolder& folder) {
   absl::StatusOr<RunSummary> earlier = LoadSummary(folder);
   RunSummary summary;
   if (earlier.ok()) summary = *std::move(earlier);
-  summary.seed_buffer = SeedSummary();
+  summary.seed_buffer = SeedBufferSummary();
   return summary;
 }
 

@@ -24,7 +24,7 @@ nlohmann::ordered_json ToJson(const EvaluationResult& result);
 std::string ResultsPath(const RunFolder& folder);
 
 // Of the seed that the replay server holds; `path` as the config has it.
-struct SeedSummary {
+struct SeedBufferSummary {
   std::string path;
   std::uint64_t rows = 0, bad_rows = 0, episodes = 0;
   double return_mean = 0, return_std = 0, return_min = 0, return_max = 0;
@@ -49,7 +49,7 @@ struct RunSummary {
   std::uint64_t updates = 0;
   std::uint64_t policy_version = 0;
   std::uint64_t restarts = 0;  // of processes that died
-  SeedSummary seed_buffer;
+  SeedBufferSummary seed_buffer;
   std::uint64_t offline_updates = 0;  // that the config asks for
   EvaluationCurve curve;              // during training
   std::uint64_t every_updates = 0;    // of evaluations, that the config asks for; 0: by time

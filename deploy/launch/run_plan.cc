@@ -24,7 +24,7 @@
 #include "learner/algorithms/registry.h"
 #include "proto/config/config_file.h"
 #include "replay/service/replay_server.h"
-#include "replay/service/seed_import.h"
+#include "replay/service/seed_buffer_import.h"
 
 namespace dbr {
 namespace {
@@ -63,33 +63,33 @@ absl::StatusOr<Config> LoadNamed(const LaunchOptions& options) {
       "--run-dir.");
 }
 
-// The config with what the flags say of the seed, whose path is made absolute.
+// The config with what the flags say of the seed buffer, whose path is made absolute.
 absl::StatusOr<Config> LoadForLaunch(const LaunchOptions& options) {
   ASSIGN_OR_RETURN(Config config, LoadNamed(options));
-  if (options.seed_buffer.empty() && config.replay().seed().path().empty()) {
+  if (options.seed_buffer.empty() && config.replay().seed_buffer().path().empty()) {
     if (options.seed_layout.empty() && !options.skip_bad_rows) return config;
     return absl::InvalidArgumentError(
-        "--seed-layout and --skip-bad-rows: of which seed? Name it with --seed-buffer.");
+        "--seed-layout and --skip-bad-rows: of which seed buffer? Name it with --seed-buffer.");
   }
-  SeedConfig* seed = config.mutable_replay()->mutable_seed();
-  if (!options.seed_buffer.empty()) seed->set_path(options.seed_buffer);
-  if (!options.seed_layout.empty()) seed->set_layout(options.seed_layout);
-  if (options.skip_bad_rows) seed->set_skip_bad_rows(true);
-  seed->set_path(std::filesystem::absolute(seed->path()).lexically_normal().string());
+  SeedBufferConfig* seed_buffer = config.mutable_replay()->mutable_seed_buffer();
+  if (!options.seed_buffer.empty()) seed_buffer->set_path(options.seed_buffer);
+  if (!options.seed_layout.empty()) seed_buffer->set_layout(options.seed_layout);
+  if (options.skip_bad_rows) seed_buffer->set_skip_bad_rows(true);
+  seed_buffer->set_path(std::filesystem::absolute(seed_buffer->path()).lexically_normal().string());
   return config;
 }
 
 // Before a folder is made for a run that could not begin.
-absl::Status CheckSeed(const Config& config, const EnvSpec& env) {
-  if (config.replay().seed().path().empty()) {
+absl::Status CheckSeedBuffer(const Config& config, const EnvSpec& env) {
+  if (config.replay().seed_buffer().path().empty()) {
     if (config.learner().offline_updates() == 0) return absl::OkStatus();
     return absl::InvalidArgumentError(absl::StrCat(
         "learner.offline_updates: ", config.learner().offline_updates(),
-        " updates are to be made on a seed, and none is named. Give one with --seed-buffer FILE; "
+        " updates are to be made on a seed buffer, and none is named. Give one with --seed-buffer FILE; "
         "this records one:\n  dbr dataset record --env ",
         env.name, " --quality medium --steps 1000000 --out ", env.name, "-medium.hdf5"));
   }
-  return CheckSeedFits(SeedOptionsFrom(config), TransitionLayout::Of(env, NeedsReturns(config.algorithm())),
+  return CheckSeedBufferFits(SeedBufferOptionsFrom(config), TransitionLayout::Of(env, NeedsReturns(config.algorithm())),
                        config.replay().capacity());
 }
 
@@ -200,7 +200,7 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
                    Address(plan.config.replay().address(), plan.folder.replay_address(), "replay.address"));
   ASSIGN_OR_RETURN(plan.learner_address, Address(plan.config.learner().address(),
                                                  plan.folder.learner_address(), "learner.address"));
-  if (!plan.resume) RETURN_IF_ERROR(CheckSeed(plan.config, plan.env));
+  if (!plan.resume) RETURN_IF_ERROR(CheckSeedBuffer(plan.config, plan.env));
   plan.actors = ActorProcesses(plan.config);
   RETURN_IF_ERROR(MakeFolder(plan.folder));
   ASSIGN_OR_RETURN(plan.lock, RunFolderLock::Take(plan.folder));

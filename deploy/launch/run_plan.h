@@ -19,9 +19,9 @@ struct LaunchOptions {
   std::string config = {};                  // a file; empty with `resume`: the run folder's own
   std::vector<std::string> overrides = {};  // path=value
   std::string run_dir = {};                 // empty: runs/ENV-ALGORITHM-DATE-TIME
-  std::string seed_buffer = {};             // replay.seed.path, unless empty
-  std::string seed_layout = {};             // replay.seed.layout, unless empty
-  bool skip_bad_rows = false;               // sets replay.seed.skip_bad_rows
+  std::string seed_buffer = {};             // replay.seed_buffer.path, unless empty
+  std::string seed_layout = {};             // replay.seed_buffer.layout, unless empty
+  bool skip_bad_rows = false;               // sets replay.seed_buffer.skip_bad_rows
   bool resume = false;
 };
 

@@ -24,8 +24,8 @@ absl::StatusOr<Config> Identity(const Config& config) {
   identity.mutable_algorithm()->clear_final_learning_rate();
   identity.mutable_algorithm()->clear_threads();
   identity.mutable_replay()->set_capacity(whole.replay().capacity());
-  *identity.mutable_replay()->mutable_seed() = whole.replay().seed();
-  identity.mutable_replay()->mutable_seed()->clear_share();
+  *identity.mutable_replay()->mutable_seed_buffer() = whole.replay().seed_buffer();
+  identity.mutable_replay()->mutable_seed_buffer()->clear_share();
   return identity;
 }
 
@@ -36,7 +36,7 @@ absl::StatusOr<Config> Outcome(const Config& config) {
   ReplayConfig* replay = outcome.mutable_replay();
   replay->clear_address();
   replay->clear_allow_insecure();
-  replay->mutable_seed()->set_path(std::filesystem::path(replay->seed().path()).filename().string());
+  replay->mutable_seed_buffer()->set_path(std::filesystem::path(replay->seed_buffer().path()).filename().string());
   LearnerConfig* learner = outcome.mutable_learner();
   learner->clear_address();
   learner->clear_allow_insecure();

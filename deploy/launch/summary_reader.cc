@@ -80,7 +80,7 @@ EvaluationResult ReadResult(const Json& json) {
           .length_mean = Real(Part(json, "steps"), "mean", kNaN)};
 }
 
-SeedSummary ReadSeed(const Json& json) {
+SeedBufferSummary ReadSeedBuffer(const Json& json) {
   const Json& returns = Part(json, "return");
   return {.path = Text(json, "path"),
           .rows = Count(json, "rows"),
@@ -124,7 +124,7 @@ absl::StatusOr<RunSummary> LoadSummary(const RunFolder& folder) {
   summary.commit = Text(json, "commit");
   summary.failure = Text(json, "failure");
   ReadCounters(json, &summary);
-  if (const Json& seed = Part(json, "seed_buffer"); !seed.empty()) summary.seed_buffer = ReadSeed(seed);
+  if (const Json& seed_buffer = Part(json, "seed_buffer"); !seed_buffer.empty()) summary.seed_buffer = ReadSeedBuffer(seed_buffer);
   summary.offline_updates = Count(json, "offline_updates");
   std::vector<EvaluationPoint> points;
   for (const Json& point : Part(json, "evaluations")) {

@@ -15,7 +15,7 @@
 #include "learner/algorithms/discrete_dbr.h"
 #include "learner/algorithms/normalized.h"
 #include "learner/algorithms/sac.h"
-#include "learner/algorithms/sac_discrete.h"
+#include "learner/algorithms/discrete_sac.h"
 #include "learner/algorithms/td3.h"
 
 namespace dbr {
@@ -45,7 +45,7 @@ constexpr Entry kAlgorithms[] = {
      CheckContinuousBear},
     {"sac", AlgorithmConfig::kSac, ActionKind::kContinuous, MakeSac, "Haarnoja et al. 2018", ""},
     {"ddqn", AlgorithmConfig::kDdqn, ActionKind::kDiscrete, MakeDdqn, "van Hasselt et al. 2016", ""},
-    {"sac_discrete", AlgorithmConfig::kSacDiscrete, ActionKind::kDiscrete, MakeSacDiscrete,
+    {"discrete_sac", AlgorithmConfig::kDiscreteSac, ActionKind::kDiscrete, MakeDiscreteSac,
      "Christodoulou 2019", ""},
     {"brac", AlgorithmConfig::kBrac, ActionKind::kContinuous, MakeBrac, "Wu, Tucker, Nachum 2019",
      "variant, adaptive_multiplier"},

@@ -17,7 +17,7 @@ inline constexpr MultiplierLimits kTemperatureLimits{.min_log = -20, .max_log = 
 
 template <class Scalar>
 struct SoftNetworks : ActorCritic<Scalar> {
-  // `config` is the SacConfig or the SacDiscreteConfig of the spec.
+  // `config` is the SacConfig or the DiscreteSacConfig of the spec.
   template <class TemperatureConfig>
   SoftNetworks(const AlgorithmSpec& spec, const TemperatureConfig& config)
       : ActorCritic<Scalar>(spec, /*policy_target=*/false),

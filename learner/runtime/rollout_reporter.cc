@@ -41,10 +41,10 @@ void RolloutReporter::Report(const StatsReply& stats) {
                      {"replay/unjudged", static_cast<double>(stats.unjudged())},
                      {"replay/samples_per_insert", stats.samples_per_insert()},
                      {"replay/label_age_mean", stats.label_age_mean()}};
-  if (stats.seed_rows() > 0) {
-    scalars.emplace_back("replay/seed", static_cast<double>(stats.seed()));
-    scalars.emplace_back("replay/seed_plus", static_cast<double>(stats.seed_plus()));
-    scalars.emplace_back("replay/seed_minus", static_cast<double>(stats.seed_minus()));
+  if (stats.seed_buffer_rows() > 0) {
+    scalars.emplace_back("replay/seed_buffer", static_cast<double>(stats.seed_buffer()));
+    scalars.emplace_back("replay/seed_buffer_plus", static_cast<double>(stats.seed_buffer_plus()));
+    scalars.emplace_back("replay/seed_buffer_minus", static_cast<double>(stats.seed_buffer_minus()));
   }
   if (stats.episodes() > 0) {
     scalars.emplace_back(tags::kEpisodeReturn, stats.recent_return_mean());

@@ -12,6 +12,7 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "proto/config.pb.h"
 
 namespace dbr {
 namespace {
@@ -146,9 +147,22 @@ std::string Suggest(const std::string& name, const std::vector<std::string>& kno
   return absl::StrCat("known: ", absl::StrJoin(known, ", "));
 }
 
+const FieldDescriptor* FindField(const std::string& name, const Descriptor& message) {
+  if (const FieldDescriptor* field = message.FindFieldByName(name)) return field;
+  for (int i = 0; i < message.field_count(); ++i) {
+    if (message.field(i)->options().GetExtension(alias) == name && !name.empty()) return message.field(i);
+  }
+  return nullptr;
+}
+
 std::string UnknownField(const std::string& name, const Descriptor& message) {
   std::vector<std::string> known;
-  for (int i = 0; i < message.field_count(); ++i) known.push_back(message.field(i)->name());
+  for (int i = 0; i < message.field_count(); ++i) {
+    const FieldDescriptor& field = *message.field(i);
+    if (field.options().GetExtension(former_name) == name && !name.empty())
+      return absl::StrCat("this field is now called '", field.name(), "'; write that name in its place");
+    known.push_back(field.name());
+  }
   return absl::StrCat("unknown field; ", Suggest(name, known));
 }
 

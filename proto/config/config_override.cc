@@ -84,7 +84,7 @@ void ApplyOverride(absl::string_view setting, Message* message, std::vector<std:
   const std::vector<std::string> names = absl::StrSplit(absl::StripAsciiWhitespace(parts.first), '.');
   std::string path;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const FieldDescriptor* field = message->GetDescriptor()->FindFieldByName(names[i]);
+    const FieldDescriptor* field = FindField(names[i], *message->GetDescriptor());
     path = JoinPath(path, names[i]);
     if (field == nullptr) {
       errors->push_back(absl::StrCat(path, ": ", UnknownField(names[i], *message->GetDescriptor())));

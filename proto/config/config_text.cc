@@ -57,7 +57,7 @@ class TextReader {
     const std::string field_path = JoinPath(path, token.text);
     tokenizer_.Next();
     const bool colon = TryConsume(":");
-    const FieldDescriptor* field = message->GetDescriptor()->FindFieldByName(token.text);
+    const FieldDescriptor* field = FindField(token.text, *message->GetDescriptor());
     if (field == nullptr) {
       NoteAt(token, field_path, UnknownField(token.text, *message->GetDescriptor()));
       return SkipValue();

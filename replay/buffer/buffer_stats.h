@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "replay/store/seed_record.h"
+#include "replay/store/seed_buffer_record.h"
 #include "replay/store/store_counters.h"
 #include "replay/store/writer_table.h"
 
@@ -37,14 +37,14 @@ LabelSummary SummarizeLabels(std::vector<float> advantages, std::vector<std::uin
 
 struct BufferStats {
   std::uint64_t total = 0, plus = 0, minus = 0, unjudged = 0;
-  std::uint64_t seed = 0, seed_plus = 0, seed_minus = 0;
+  std::uint64_t seed_buffer = 0, seed_buffer_plus = 0, seed_buffer_minus = 0;
   std::uint64_t capacity = 0, bytes = 0;
-  std::uint64_t inserted = 0;  // without the seed
+  std::uint64_t inserted = 0;  // without the seed buffer
   std::uint64_t evicted = 0;
-  std::uint64_t seed_rows = 0;  // that ever came in
-  SeedRecord seed_record{};
+  std::uint64_t seed_buffer_rows = 0;  // that ever came in
+  SeedBufferRecord seed_buffer_record{};
   StoreCounters counters{};
-  double samples_per_insert = 0;  // over the life of the buffer; the seed, and draws from it alone, apart
+  double samples_per_insert = 0;  // over the life of the buffer; the seed buffer, and draws from it alone, apart
   double insert_rate = 0, sample_rate = 0, relabel_rate = 0;  // a second, over the last seconds
   LabelSummary labels;  // of at most PartitionedBuffer::kLabelsLookedAt rows, evenly spread over the buffer
   std::vector<WriterSummary> writers;

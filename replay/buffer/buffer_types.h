@@ -20,8 +20,8 @@ struct BufferOptions {
   RateLimiterOptions limiter;
   bool cumulative_advantage =
       false;  // a relabel with a gives max(A, 0) + a in place of a (A: the label before)
-  // Share of the seed in a draw from D, while D holds both; 0: as their sizes have it.
-  double seed_share = 0;
+  // Share of the seed buffer in a draw from D, while D holds both; 0: as their sizes have it.
+  double seed_buffer_share = 0;
   std::uint64_t seed = 1;
   std::function<absl::Time()> now = absl::Now;  // for rates and the uptime
 };
@@ -55,7 +55,7 @@ using DrawBuffers = std::array<DrawColumns, kDrawnParts>;  // with room for the 
 struct DrawResult {
   std::array<std::uint32_t, kDrawnParts> drawn{};  // the asked count, or 0 of an empty partition
   std::uint64_t total = 0, plus = 0, minus = 0, unjudged = 0;
-  std::uint64_t inserted = 0, episodes = 0;  // without the seed
+  std::uint64_t inserted = 0, episodes = 0;  // without the seed buffer
   double raised_tolerance = 0;  // other than 0 where the limiter's tolerance had to be raised for this draw
 };
 

@@ -59,7 +59,7 @@ PartitionedBuffer::PartitionedBuffer(std::unique_ptr<TransitionStore> store, con
     : layout_(store->layout()),
       capacity_(store->capacity()),
       cumulative_advantage_(options.cumulative_advantage),
-      seed_share_(options.seed_share),
+      seed_buffer_share_(options.seed_buffer_share),
       now_(options.now),
       start_(options.now()),
       store_(std::move(store)),

@@ -24,12 +24,12 @@
 namespace dbr {
 
 // Thread-safe behind one lock, which it holds for at most kRowsPerLock inserted rows, one draw or one
-// relabel. Rows are evicted first in, first out; a seed may be pinned, and then the oldest of the others
+// relabel. Rows are evicted first in, first out; a seed buffer may be pinned, and then the oldest of the others
 // goes. An advantage of 0 lies in D+ and in D-.
 class PartitionedBuffer {
  public:
   static constexpr int kRowsPerLock = 256;
-  static constexpr int kSeedRowsPerLock = 4096;
+  static constexpr int kSeedBufferRowsPerLock = 4096;
   static constexpr std::uint64_t kMaxDraws = 1 << 18;     // in one call
   static constexpr std::uint64_t kMaxRelabels = 1 << 18;  // in one call
   static constexpr std::uint64_t kLabelsLookedAt = 20000;
@@ -48,16 +48,16 @@ class PartitionedBuffer {
   // discrete action that is none are refused; both are counted by writer. Blocks until the limiter admits.
   // DeadlineExceeded, naming limiter, counters and bounds (what is stored stays, call again to go on);
   // Unavailable after Close; InvalidArgument for sequence numbers or ends that make no sense, and where a
-  // pinned seed has every place.
+  // pinned seed buffer has every place.
   absl::Status Insert(std::uint32_t place, InsertBatch* batch, absl::Time deadline);
 
-  // Appends rows of the seed, flat as the layout lays them, not yet judged. The limiter does not ask for
+  // Appends rows of the seed buffer, flat as the layout lays them, not yet judged. The limiter does not ask for
   // them, nor count them. InvalidArgument where they are more than fit; FailedPrecondition once something
-  // else has been inserted, or after CompleteSeed.
-  absl::Status InsertSeed(absl::Span<const float> rows);
-  // Ends the seed and writes down what is known of it (`record`, but for its counts of rows); with `pin` none
-  // of its rows is ever evicted. FailedPrecondition as InsertSeed's.
-  absl::Status CompleteSeed(const SeedRecord& record, bool pin);
+  // else has been inserted, or after CompleteSeedBuffer.
+  absl::Status InsertSeedBuffer(absl::Span<const float> rows);
+  // Ends the seed buffer and writes down what is known of it (`record`, but for its counts of rows); with `pin` none
+  // of its rows is ever evicted. FailedPrecondition as InsertSeedBuffer's.
+  absl::Status CompleteSeedBuffer(const SeedBufferRecord& record, bool pin);
 
   // Draws with replacement into `out`, all parts under one snapshot. Blocks until the limiter admits and,
   // unless they may be empty, the asked partitions have something. Errors: DeadlineExceeded, naming what it
@@ -92,7 +92,7 @@ class PartitionedBuffer {
   };
 
   absl::Status CheckHasPlace() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::Status CheckSeedMayCome() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status CheckSeedBufferMayCome() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Fills drawn_slots_.
   void ChooseSlots(int part, std::uint32_t count) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   RateLimiter::Counts Counts() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
@@ -120,7 +120,7 @@ class PartitionedBuffer {
   const TransitionLayout layout_;
   const std::uint64_t capacity_;
   const bool cumulative_advantage_;
-  const double seed_share_;
+  const double seed_buffer_share_;
   const std::function<absl::Time()> now_;
   const absl::Time start_;
 

@@ -30,15 +30,15 @@ void PartitionedBuffer::AddCounts(BufferStats* stats) const {
   stats->plus = partitions_.size(kPlus);
   stats->minus = partitions_.size(kMinus);
   stats->unjudged = partitions_.size(kUnjudgedPart);
-  stats->seed = partitions_.seed(kAll);
-  stats->seed_plus = partitions_.seed(kPlus);
-  stats->seed_minus = partitions_.seed(kMinus);
+  stats->seed_buffer = partitions_.seed_buffer(kAll);
+  stats->seed_buffer_plus = partitions_.seed_buffer(kPlus);
+  stats->seed_buffer_minus = partitions_.seed_buffer(kMinus);
   stats->bytes = store_->bytes();
   stats->inserted = store_->online_inserted();
   stats->evicted = store_->inserted() - store_->size();
   stats->counters = store_->counters();
-  stats->seed_rows = store_->seed_rows();
-  stats->seed_record = store_->seed();
+  stats->seed_buffer_rows = store_->seed_buffer_rows();
+  stats->seed_buffer_record = store_->seed_buffer();
   const RateLimiter::Counts counts = Counts();
   if (counts.inserted > 0)
     stats->samples_per_insert = static_cast<double>(counts.sampled) / static_cast<double>(counts.inserted);

@@ -16,7 +16,7 @@ RateLimiter::Counts PartitionedBuffer::Counts() const {
   return {.inserted = store_->online_inserted(),
           .sampled = counters.sampled - counters.sampled_offline,
           .size = store_->size(),
-          .seed = store_->seed_rows()};
+          .seed_buffer = store_->seed_buffer_rows()};
 }
 
 // A draw that waits for an empty partition can only be helped by an insert or a relabel, and who draws may be

@@ -27,12 +27,12 @@ class Partitions {
   void Add(std::uint32_t slot, float advantage, Source source) {
     parts_[kAll].Insert(slot);
     Join(slot, advantage, source);
-    seed_[kAll] += source == Source::kSeed;
+    seed_buffer_[kAll] += source == Source::kSeedBuffer;
   }
   void Remove(std::uint32_t slot, float advantage, Source source) {
     parts_[kAll].Remove(slot);
     Leave(slot, advantage, source);
-    seed_[kAll] -= source == Source::kSeed;
+    seed_buffer_[kAll] -= source == Source::kSeedBuffer;
   }
   void Relabel(std::uint32_t slot, float old_advantage, float advantage, Source source) {
     if (Code(old_advantage) == Code(advantage)) return;
@@ -42,7 +42,7 @@ class Partitions {
 
   const SlotSet& operator[](int part) const { return parts_[part]; }
   std::uint32_t size(int part) const { return parts_[part].size(); }
-  std::uint64_t seed(int part) const { return seed_[part]; }  // rows of source seed
+  std::uint64_t seed_buffer(int part) const { return seed_buffer_[part]; }  // rows of source seed buffer
 
  private:
   // The parts beside D that an advantage belongs to, as bits.
@@ -54,19 +54,19 @@ class Partitions {
     for (int part = kPlus; part < kAllParts; ++part) {
       if ((Code(advantage) >> part & 1) == 0) continue;
       parts_[part].Insert(slot);
-      seed_[part] += source == Source::kSeed;
+      seed_buffer_[part] += source == Source::kSeedBuffer;
     }
   }
   void Leave(std::uint32_t slot, float advantage, Source source) {
     for (int part = kPlus; part < kAllParts; ++part) {
       if ((Code(advantage) >> part & 1) == 0) continue;
       parts_[part].Remove(slot);
-      seed_[part] -= source == Source::kSeed;
+      seed_buffer_[part] -= source == Source::kSeedBuffer;
     }
   }
 
   std::array<SlotSet, kAllParts> parts_;
-  std::array<std::uint64_t, kAllParts> seed_{};
+  std::array<std::uint64_t, kAllParts> seed_buffer_{};
 };
 
 }  // namespace dbr

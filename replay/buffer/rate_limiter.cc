@@ -29,7 +29,7 @@ absl::StatusOr<RateLimiter> RateLimiter::Make(const RateLimiterOptions& options,
 }
 
 std::uint64_t RateLimiter::Minimum(const Counts& counts) const {
-  return options_.min_size - std::min(options_.min_size, counts.seed);
+  return options_.min_size - std::min(options_.min_size, counts.seed_buffer);
 }
 
 double RateLimiter::Lead(const Counts& counts) const {
@@ -58,7 +58,7 @@ std::string RateLimiter::Describe(const Counts& counts) const {
   return absl::StrCat("rate limiter (samples_per_insert ", options_.samples_per_insert, ", tolerance ",
                       options_.tolerance, ", min_size ", options_.min_size, ") with inserted ",
                       counts.inserted, ", sampled ", counts.sampled, ", size ", counts.size,
-                      counts.seed > 0 ? absl::StrCat(", seed ", counts.seed, " (counted apart)") : "");
+                      counts.seed_buffer > 0 ? absl::StrCat(", seed buffer ", counts.seed_buffer, " (counted apart)") : "");
 }
 
 std::string RateLimiter::WhyInsertWaits(const Counts& counts) const {

@@ -35,12 +35,12 @@ absl::StatusOr<ReplayServerOptions> MakeOptions(const ServiceArguments& argument
   return options;
 }
 
-void LogSeed(const std::string& path, const SeedRecord& seed) {
+void LogSeedBuffer(const std::string& path, const SeedBufferRecord& seed_buffer) {
   spdlog::info(
-      "seed {}: {} transitions, {} whole episodes with a mean return of {:.1f}, loaded at {:.0f} rows/s",
-      path, seed.rows, seed.episodes, seed.return_mean, seed.rows_per_second);
-  if (seed.bad_rows > 0)
-    spdlog::warn("seed {}: {} rows with values that are not finite are left out", path, seed.bad_rows);
+      "seed buffer {}: {} transitions, {} whole episodes with a mean return of {:.1f}, loaded at {:.0f} rows/s",
+      path, seed_buffer.rows, seed_buffer.episodes, seed_buffer.return_mean, seed_buffer.rows_per_second);
+  if (seed_buffer.bad_rows > 0)
+    spdlog::warn("seed buffer {}: {} rows with values that are not finite are left out", path, seed_buffer.bad_rows);
 }
 
 absl::Status Serve(const ServiceArguments& arguments, const Config& config) {
@@ -54,7 +54,7 @@ absl::Status Serve(const ServiceArguments& arguments, const Config& config) {
     spdlog::info("resumed {} with {} transitions; {} were incomplete and are dropped", options.store.path,
                  server->recovered(), server->torn());
   }
-  if (!options.seed.path.empty()) LogSeed(options.seed.path, server->seed());
+  if (!options.seed_buffer.path.empty()) LogSeedBuffer(options.seed_buffer.path, server->seed_buffer_buffer());
   spdlog::info("listening on {}", server->address());
   stop.WaitForNotification();
   spdlog::info("stopping");

@@ -25,21 +25,21 @@ ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& la
   options.buffer.limiter.min_size = replay.min_size();
   options.buffer.cumulative_advantage = config.algorithm().dbr().advantage() == DbrConfig::ARM_CUMULATIVE;
   options.buffer.seed = config.seed();
-  options.buffer.seed_share = replay.seed().share();
-  options.seed = SeedOptionsFrom(config);
+  options.buffer.seed_buffer_share = replay.seed_buffer().share();
+  options.seed_buffer = SeedBufferOptionsFrom(config);
   options.server.address = replay.address();
   options.server.allow_insecure = replay.allow_insecure();
   return options;
 }
 
-SeedOptions SeedOptionsFrom(const Config& config) {
-  const SeedConfig& seed = config.replay().seed();
-  return {.path = seed.path(),
-          .layout = seed.layout(),
+SeedBufferOptions SeedBufferOptionsFrom(const Config& config) {
+  const SeedBufferConfig& seed_buffer = config.replay().seed_buffer();
+  return {.path = seed_buffer.path(),
+          .layout = seed_buffer.layout(),
           .env = config.env().name(),
           .discount = static_cast<float>(config.algorithm().discount()),
-          .evict = seed.evict(),
-          .skip_bad_rows = seed.skip_bad_rows(),
+          .evict = seed_buffer.evict(),
+          .skip_bad_rows = seed_buffer.skip_bad_rows(),
           .min_rows = config.learner().offline_updates() > 0 ? config.replay().min_size() : 0,
           .others_will_come = !TrainsOfflineAlone(config)};
 }
@@ -61,8 +61,8 @@ absl::StatusOr<std::unique_ptr<ReplayServer>> ReplayServer::StartWith(
   std::unique_ptr<ReplayServer> server(new ReplayServer(std::move(buffer)));
   server->recovered_ = recovered;
   server->torn_ = torn;
-  if (!options.seed.path.empty()) {
-    ASSIGN_OR_RETURN(server->seed_, ImportSeed(options.seed, server->buffer_.get()));
+  if (!options.seed_buffer.path.empty()) {
+    ASSIGN_OR_RETURN(server->seed_buffer_, ImportSeedBuffer(options.seed_buffer, server->buffer_.get()));
   }
   const std::vector<grpc::Service*> services = {&server->service_};
   ASSIGN_OR_RETURN(server->running_, StartServer(options.server, services));

@@ -9,9 +9,9 @@
 #include "proto/config.pb.h"
 #include "proto/rpc/server.h"
 #include "replay/buffer/partitioned_buffer.h"
-#include "replay/service/seed_import.h"
+#include "replay/service/seed_buffer_import.h"
 #include "replay/service/service.h"
-#include "replay/store/seed_record.h"
+#include "replay/store/seed_buffer_record.h"
 #include "replay/store/transition_store.h"
 
 namespace dbr {
@@ -19,7 +19,7 @@ namespace dbr {
 struct ReplayServerOptions {
   StoreOptions store;
   BufferOptions buffer;
-  SeedOptions seed;
+  SeedBufferOptions seed_buffer;
   ServerOptions server;
 };
 
@@ -28,12 +28,12 @@ struct ReplayServerOptions {
 ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& layout);
 
 // What `config` says of the seed.
-SeedOptions SeedOptionsFrom(const Config& config);
+SeedBufferOptions SeedBufferOptionsFrom(const Config& config);
 
 // A running replay server. Thread-compatible.
 class ReplayServer {
  public:
-  // Loads the seed before it serves. Errors of TransitionStore::Open, PartitionedBuffer::Make, ImportSeed and
+  // Loads the seed buffer before it serves. Errors of TransitionStore::Open, PartitionedBuffer::Make, ImportSeedBuffer and
   // StartServer.
   static absl::StatusOr<std::unique_ptr<ReplayServer>> Start(const ReplayServerOptions& options);
   ~ReplayServer();  // Stop()
@@ -45,7 +45,7 @@ class ReplayServer {
   std::uint64_t recovered() const { return recovered_; }  // rows taken over from a store
   std::uint64_t torn() const { return torn_; }            // rows that were incomplete there, and dropped
 
-  const SeedRecord& seed() const { return seed_; }  // zeros where there is none
+  const SeedBufferRecord& seed_buffer() const { return seed_buffer_; }  // zeros where there is none
 
   // Accepts no more calls, answers those that wait, and writes the store to disk. Blocks up to some seconds.
   absl::Status Stop();
@@ -59,7 +59,7 @@ class ReplayServer {
   std::unique_ptr<PartitionedBuffer> buffer_;
   ReplayService service_;
   RunningServer running_;
-  SeedRecord seed_;
+  SeedBufferRecord seed_buffer_;
   std::uint64_t recovered_ = 0;
   std::uint64_t torn_ = 0;
 };

@@ -42,7 +42,7 @@ DrawColumns RoomForPart(std::size_t count, const TransitionLayout& layout, Sampl
 void EncodeWriter(const WriterSummary& summary, WriterStats* writer) {
   writer->set_name(summary.identity.name);
   writer->set_id(summary.identity.id);
-  writer->set_source(summary.identity.source == Source::kSeed ? SEED : ONLINE);
+  writer->set_source(summary.identity.source == Source::kSeedBuffer ? SEED_BUFFER : ONLINE);
   writer->set_inserted(summary.inserted);
   writer->set_last_sequence(summary.last_sequence);
   writer->set_duplicates(summary.duplicates);
@@ -56,9 +56,9 @@ void EncodeCounts(const BufferStats& stats, StatsReply* reply) {
   reply->set_plus(stats.plus);
   reply->set_minus(stats.minus);
   reply->set_unjudged(stats.unjudged);
-  reply->set_seed(stats.seed);
-  reply->set_seed_plus(stats.seed_plus);
-  reply->set_seed_minus(stats.seed_minus);
+  reply->set_seed_buffer(stats.seed_buffer);
+  reply->set_seed_buffer_plus(stats.seed_buffer_plus);
+  reply->set_seed_buffer_minus(stats.seed_buffer_minus);
   reply->set_capacity(stats.capacity);
   reply->set_bytes(stats.bytes);
   reply->set_inserted(stats.inserted);
@@ -73,17 +73,17 @@ void EncodeCounts(const BufferStats& stats, StatsReply* reply) {
   reply->set_sampled_offline(stats.counters.sampled_offline);
 }
 
-void EncodeSeed(const BufferStats& stats, StatsReply* reply) {
-  const SeedRecord& record = stats.seed_record;
+void EncodeSeedBuffer(const BufferStats& stats, StatsReply* reply) {
+  const SeedBufferRecord& record = stats.seed_buffer_record;
   const auto number = [&record](double value) { return record.complete != 0 ? value : std::nan(""); };
-  reply->set_seed_rows(stats.seed_rows);
-  reply->set_seed_bad_rows(record.bad_rows);
-  reply->set_seed_episodes(record.episodes);
-  reply->set_seed_return_mean(number(record.return_mean));
-  reply->set_seed_return_std(number(record.return_std));
-  reply->set_seed_return_min(number(record.return_min));
-  reply->set_seed_return_max(number(record.return_max));
-  reply->set_seed_rows_per_second(record.rows_per_second);
+  reply->set_seed_buffer_rows(stats.seed_buffer_rows);
+  reply->set_seed_buffer_bad_rows(record.bad_rows);
+  reply->set_seed_buffer_episodes(record.episodes);
+  reply->set_seed_buffer_return_mean(number(record.return_mean));
+  reply->set_seed_buffer_return_std(number(record.return_std));
+  reply->set_seed_buffer_return_min(number(record.return_min));
+  reply->set_seed_buffer_return_max(number(record.return_max));
+  reply->set_seed_buffer_rows_per_second(record.rows_per_second);
 }
 
 }  // namespace
@@ -173,7 +173,7 @@ void Encode(const RelabelResult& result, RelabelReply* reply) {
 
 void Encode(const BufferStats& stats, StatsReply* reply) {
   EncodeCounts(stats, reply);
-  EncodeSeed(stats, reply);
+  EncodeSeedBuffer(stats, reply);
   reply->set_insert_rate(stats.insert_rate);
   reply->set_sample_rate(stats.sample_rate);
   reply->set_relabel_rate(stats.relabel_rate);

@@ -8,7 +8,7 @@ namespace dbr {
 // Counters that live as long as the store.
 struct StoreCounters {
   std::uint64_t sampled;
-  std::uint64_t sampled_offline;  // of them, before the first row that is no seed
+  std::uint64_t sampled_offline;  // of them, before the first row that is no seed buffer
   std::uint64_t relabelled;
   std::uint64_t relabel_evicted;
   std::uint64_t relabel_stale;

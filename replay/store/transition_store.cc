@@ -58,7 +58,7 @@ absl::StatusOr<std::uint64_t> RowsFor(const StoreOptions& options, std::uint64_t
 }  // namespace
 
 std::size_t TransitionStore::ContentBytes(std::uint64_t capacity, int stride) {
-  return Aligned(sizeof(StoreCounters)) + Aligned(sizeof(SeedRecord)) +
+  return Aligned(sizeof(StoreCounters)) + Aligned(sizeof(SeedBufferRecord)) +
          Aligned(kRecentEpisodes * sizeof(EpisodeEnd)) +
          Aligned(WriterTable::kPlaces * sizeof(WriterRecord)) + Aligned(capacity * sizeof(Meta)) +
          Aligned(capacity * static_cast<std::size_t>(stride) * sizeof(float));
@@ -90,7 +90,7 @@ TransitionStore::TransitionStore(const TransitionLayout& layout, std::uint64_t c
     return std::exchange(section, section + Aligned(bytes));
   };
   counters_ = reinterpret_cast<StoreCounters*>(take(sizeof(StoreCounters)));
-  seed_ = reinterpret_cast<SeedRecord*>(take(sizeof(SeedRecord)));
+  seed_buffer_ = reinterpret_cast<SeedBufferRecord*>(take(sizeof(SeedBufferRecord)));
   episodes_ = reinterpret_cast<EpisodeEnd*>(take(kRecentEpisodes * sizeof(EpisodeEnd)));
   writers_ = std::make_unique<WriterTable>(
       reinterpret_cast<WriterRecord*>(take(WriterTable::kPlaces * sizeof(WriterRecord))));
@@ -111,13 +111,13 @@ void TransitionStore::Pin(std::uint64_t rows) {
 }
 
 absl::Status TransitionStore::Recover() {
-  if (seed_->complete != 0) {
-    if (seed_->complete != 1 || seed_->pinned > capacity_ || seed_->pinned > seed_->rows) {
-      return absl::DataLossError(absl::StrCat("replay store: its record of the seed is damaged (rows ",
-                                              seed_->rows, ", pinned ", seed_->pinned, ", capacity ",
+  if (seed_buffer_->complete != 0) {
+    if (seed_buffer_->complete != 1 || seed_buffer_->pinned > capacity_ || seed_buffer_->pinned > seed_buffer_->rows) {
+      return absl::DataLossError(absl::StrCat("replay store: its record of the seed buffer is damaged (rows ",
+                                              seed_buffer_->rows, ", pinned ", seed_buffer_->pinned, ", capacity ",
                                               capacity_, "). Start a new run."));
     }
-    Pin(seed_->pinned);
+    Pin(seed_buffer_->pinned);
   }
   std::uint64_t newest = pinned_;
   std::uint64_t keys = 0;
@@ -130,16 +130,16 @@ absl::Status TransitionStore::Recover() {
   for (std::uint64_t key = 1; key <= pinned_; ++key) {
     if (!LooksWhole(key))
       return absl::DataLossError(
-          absl::StrCat("replay store: row ", key, " of its seed is damaged. Start a new run."));
+          absl::StrCat("replay store: row ", key, " of its seed buffer is damaged. Start a new run."));
   }
   next_key_ = newest + 1;
   while (ring_size_ < std::min(capacity_ - pinned_, newest - pinned_) && LooksWhole(newest - ring_size_))
     ++ring_size_;
   torn_ = keys - size();
-  if (seed_->complete != 0) {
-    seed_rows_ = std::min(seed_->rows, inserted());
-  } else if (size() > 0 && metas_[SlotOf(oldest_key())].labels.source == Source::kSeed) {
-    seed_rows_ = inserted();  // the process was killed before it had all
+  if (seed_buffer_->complete != 0) {
+    seed_buffer_rows_ = std::min(seed_buffer_->rows, inserted());
+  } else if (size() > 0 && metas_[SlotOf(oldest_key())].labels.source == Source::kSeedBuffer) {
+    seed_buffer_rows_ = inserted();  // the process was killed before it had all
   }
   for (std::uint64_t rank = 0; rank < size(); ++rank) {
     const RowLabels& labels = metas_[SlotOf(KeyAtRank(rank))].labels;
@@ -169,19 +169,19 @@ std::uint32_t TransitionStore::Append(const TransitionView& transition, const Ro
   return Write(labels, [&transition, this](float* out) { WriteRow(transition, layout_, out); });
 }
 
-std::uint32_t TransitionStore::AppendSeed(const float* row, const RowLabels& labels) {
-  DBR_CHECK(seed_->complete == 0 && online_inserted() == 0);
-  ++seed_rows_;
+std::uint32_t TransitionStore::AppendSeedBuffer(const float* row, const RowLabels& labels) {
+  DBR_CHECK(seed_buffer_->complete == 0 && online_inserted() == 0);
+  ++seed_buffer_rows_;
   return Write(labels, [row, this](float* out) { std::memcpy(out, row, stride_ * sizeof(float)); });
 }
 
-void TransitionStore::CompleteSeed(SeedRecord record, bool pin) {
-  DBR_CHECK(seed_->complete == 0 && online_inserted() == 0);
+void TransitionStore::CompleteSeedBuffer(SeedBufferRecord record, bool pin) {
+  DBR_CHECK(seed_buffer_->complete == 0 && online_inserted() == 0);
   record.complete = 0;
-  record.rows = seed_rows_;
-  record.pinned = pin ? seed_rows_ : 0;
-  *seed_ = record;
-  std::atomic_ref<std::uint64_t>(seed_->complete).store(1, std::memory_order_release);
+  record.rows = seed_buffer_rows_;
+  record.pinned = pin ? seed_buffer_rows_ : 0;
+  *seed_buffer_ = record;
+  std::atomic_ref<std::uint64_t>(seed_buffer_->complete).store(1, std::memory_order_release);
   Pin(record.pinned);
   ring_size_ -= record.pinned;
 }

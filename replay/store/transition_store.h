@@ -9,7 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "core/transition.h"
-#include "replay/store/seed_record.h"
+#include "replay/store/seed_buffer_record.h"
 #include "replay/store/store_counters.h"
 #include "replay/store/store_file.h"
 #include "replay/store/writer_table.h"
@@ -36,7 +36,7 @@ struct RowLabels {
 };
 
 // Rows enter at the newest end and leave at the oldest. Each has a key, counted from 1 and never used again,
-// so that the slot of a key is arithmetic. A store may be begun with a seed of offline data, which has the
+// so that the slot of a key is arithmetic. A store may be begun with a seed buffer of offline data, which has the
 // first keys; where it is pinned it stays in the first slots, and the others are a ring for what comes later:
 // the held keys are [1, pinned] and [oldest_key, next_key), and key k > pinned lies in slot
 // pinned + (k - 1 - pinned) % (capacity - pinned). As long as nothing was evicted key k lies in slot k - 1,
@@ -58,15 +58,15 @@ class TransitionStore {
   void Evict();  // the oldest row that is not pinned; requires CanEvict()
   bool CanEvict() const { return ring_size_ > 0; }
 
-  // Appends a row of the seed, flat as layout() says. Requires that nothing else came before, and
+  // Appends a row of the seed buffer, flat as layout() says. Requires that nothing else came before, and
   // size() < capacity().
-  std::uint32_t AppendSeed(const float* row, const RowLabels& labels);
-  // Ends the seed: writes down `record`, with rows = seed_rows(), and pins all of them where asked.
-  void CompleteSeed(SeedRecord record, bool pin);
-  const SeedRecord& seed() const { return *seed_; }       // zeros before CompleteSeed
-  std::uint64_t seed_rows() const { return seed_rows_; }  // that ever came in
-  std::uint64_t seed_held() const {
-    return pinned_ > 0 ? pinned_ : seed_rows_ - std::min(seed_rows_, oldest_key() - 1);
+  std::uint32_t AppendSeedBuffer(const float* row, const RowLabels& labels);
+  // Ends the seed buffer: writes down `record`, with rows = seed_buffer_rows(), and pins all of them where asked.
+  void CompleteSeedBuffer(SeedBufferRecord record, bool pin);
+  const SeedBufferRecord& seed_buffer() const { return *seed_buffer_; }       // zeros before CompleteSeedBuffer
+  std::uint64_t seed_buffer_rows() const { return seed_buffer_rows_; }  // that ever came in
+  std::uint64_t seed_buffer_held() const {
+    return pinned_ > 0 ? pinned_ : seed_buffer_rows_ - std::min(seed_buffer_rows_, oldest_key() - 1);
   }
 
   bool Holds(std::uint64_t key) const {
@@ -77,7 +77,7 @@ class TransitionStore {
     if (key <= pinned_) return static_cast<std::uint32_t>(key - 1);
     return static_cast<std::uint32_t>(pinned_ + (key - 1 - pinned_) % ring_);
   }
-  // Key of the held row that `rank` held rows are older than; the seed's rows come first. rank < size().
+  // Key of the held row that `rank` held rows are older than; the seed buffer's rows come first. rank < size().
   std::uint64_t KeyAtRank(std::uint64_t rank) const {
     return rank < pinned_ ? rank + 1 : oldest_key() + (rank - pinned_);
   }
@@ -94,8 +94,8 @@ class TransitionStore {
   std::uint64_t size() const { return pinned_ + ring_size_; }
   std::uint64_t next_key() const { return next_key_; }
   std::uint64_t oldest_key() const { return next_key_ - ring_size_; }  // that is not pinned
-  std::uint64_t inserted() const { return next_key_ - 1; }             // seed included
-  std::uint64_t online_inserted() const { return inserted() - seed_rows_; }
+  std::uint64_t inserted() const { return next_key_ - 1; }             // seed buffer included
+  std::uint64_t online_inserted() const { return inserted() - seed_buffer_rows_; }
   std::uint64_t bytes() const { return bytes_; }  // of rows, labels and indices, at capacity
   std::uint64_t torn() const { return torn_; }    // rows that reopening found incomplete
   StoreCounters& counters() { return *counters_; }
@@ -127,12 +127,12 @@ class TransitionStore {
   const std::uint64_t bytes_;
   const std::unique_ptr<StoreFile> file_;
   StoreCounters* counters_;
-  SeedRecord* seed_;
+  SeedBufferRecord* seed_buffer_;
   EpisodeEnd* episodes_;
   Meta* metas_;
   float* rows_;
   std::unique_ptr<WriterTable> writers_;
-  std::uint64_t seed_rows_ = 0;
+  std::uint64_t seed_buffer_rows_ = 0;
   std::uint64_t pinned_ = 0;
   std::uint64_t ring_;           // slots that are not pinned; 1 where all are, and then none is asked for
   std::uint64_t ring_size_ = 0;  // rows held in them

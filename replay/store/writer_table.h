@@ -12,7 +12,7 @@
 
 namespace dbr {
 
-enum class Source : std::uint32_t { kOnline = 0, kSeed = 1 };
+enum class Source : std::uint32_t { kOnline = 0, kSeedBuffer = 1 };
 
 // What a writer says of itself when it opens a stream.
 struct WriterIdentity {

@@ -83,8 +83,8 @@ void Td3(AlgorithmConfig& config) {
 void Awac(AlgorithmConfig& config) {
   config.mutable_awac();
 }
-void SacDiscrete(AlgorithmConfig& config) {
-  config.mutable_sac_discrete();
+void DiscreteSac(AlgorithmConfig& config) {
+  config.mutable_discrete_sac();
 }
 void Ddqn(AlgorithmConfig& config) {
   config.mutable_ddqn();
@@ -118,7 +118,7 @@ void LearnerUpdate(benchmark::State& state, const AlgorithmSpec& spec) {
 
 DBR_UPDATE("dbr/connect4", With(Connect4(), DiscreteDbr));
 DBR_UPDATE("bear/connect4", With(Connect4(), Bear));
-DBR_UPDATE("sac_discrete/connect4", With(Connect4(), SacDiscrete));
+DBR_UPDATE("discrete_sac/connect4", With(Connect4(), DiscreteSac));
 DBR_UPDATE("ddqn/connect4", With(Connect4(), Ddqn));
 DBR_UPDATE("sac/hopper", With(Hopper(), Sac));
 DBR_UPDATE("dbr/hopper", With(Hopper(), Dbr));

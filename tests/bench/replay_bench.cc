@@ -17,7 +17,7 @@
 #include "replay/client/writer.h"
 #include "replay/dataset/dataset_writer.h"
 #include "replay/service/replay_server.h"
-#include "replay/service/seed_import.h"
+#include "replay/service/seed_buffer_import.h"
 
 namespace dbr {
 namespace {
@@ -219,11 +219,11 @@ void ReplaySample(benchmark::State& state) {
 BENCHMARK(ReplaySample)->UseRealTime()->Unit(benchmark::kMicrosecond);
 
 // A file of robot data as `dbr dataset record` writes it: hopper's sizes, episodes of 1,000 steps.
-class SeedFile {
+class SeedBufferFile {
  public:
   static constexpr int kEpisodes = 200, kSteps = 1000;
 
-  SeedFile() {
+  SeedBufferFile() {
     DBR_CHECK(mkdtemp(folder_.data()) != nullptr);
     const EnvSpec env{.name = "hopper",
                       .observation_size = 15,
@@ -243,7 +243,7 @@ class SeedFile {
     }
     DBR_CHECK((*writer)->Finish().ok());
   }
-  ~SeedFile() { std::filesystem::remove_all(folder_); }
+  ~SeedBufferFile() { std::filesystem::remove_all(folder_); }
 
   std::string path() const { return absl::StrCat(folder_, "/seed.hdf5"); }
   std::string store() const { return absl::StrCat(folder_, "/store"); }
@@ -254,27 +254,27 @@ class SeedFile {
 };
 
 // From the file into a store that lies in a file too, all in one thread.
-void SeedImport(benchmark::State& state) {
-  const SeedFile file;
+void SeedBufferImport(benchmark::State& state) {
+  const SeedBufferFile file;
   for (auto _ : state) {
     state.PauseTiming();
     std::filesystem::remove(file.store());
     auto store = TransitionStore::Open({.path = file.store(),
                                         .env = "hopper",
                                         .layout = file.layout,
-                                        .capacity = 2 * SeedFile::kEpisodes * SeedFile::kSteps});
+                                        .capacity = 2 * SeedBufferFile::kEpisodes * SeedBufferFile::kSteps});
     DBR_CHECK(store.ok());
     auto buffer = PartitionedBuffer::Make(std::move(*store), {});
     DBR_CHECK(buffer.ok());
     state.ResumeTiming();
-    DBR_CHECK(ImportSeed({.path = file.path(), .layout = "d4rl", .env = "hopper"}, buffer->get()).ok());
+    DBR_CHECK(ImportSeedBuffer({.path = file.path(), .layout = "d4rl", .env = "hopper"}, buffer->get()).ok());
     state.PauseTiming();
     buffer->reset();
     state.ResumeTiming();
   }
-  state.SetItemsProcessed(state.iterations() * SeedFile::kEpisodes * SeedFile::kSteps);
+  state.SetItemsProcessed(state.iterations() * SeedBufferFile::kEpisodes * SeedBufferFile::kSteps);
 }
-BENCHMARK(SeedImport)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(SeedBufferImport)->UseRealTime()->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace dbr

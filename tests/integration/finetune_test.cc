@@ -21,16 +21,16 @@ using ::testing::IsEmpty;
 using ::testing::Not;
 using Json = nlohmann::json;
 
-constexpr int kSeedRows = 3000;
+constexpr int kSeedBufferRows = 3000;
 constexpr int kOfflineUpdates = 200;  // of finetune.textproto
 
 class FinetuneTest : public testing::Test {
  protected:
-  // A seed of hopper with random actions.
+  // A seed buffer of hopper with random actions.
   void SetUp() override {
     const auto [status, output] =
         RunProgram("dbr", {"dataset", "record", "--env", "hopper", "--quality", "random", "--steps",
-                           absl::StrCat(kSeedRows), "--out", seed_});
+                           absl::StrCat(kSeedBufferRows), "--out", seed_buffer_});
     ASSERT_EQ(status, 0) << output;
   }
 
@@ -38,43 +38,43 @@ class FinetuneTest : public testing::Test {
     std::vector<std::string> arguments = {
         "launch",        absl::StrCat(DBR_SOURCE_DIR, "/tests/integration/finetune.textproto"),
         "--run-dir",     run_.root,
-        "--seed-buffer", seed_};
+        "--seed-buffer", seed_buffer_};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }
 
-  // Numbers of the seed, as the replay server tells them in JSON.
-  static void ExpectWholeSeed(const Json& stats) {
+  // Numbers of the seed buffer, as the replay server tells them in JSON.
+  static void ExpectWholeSeedBuffer(const Json& stats) {
     ASSERT_TRUE(stats.is_object());
-    EXPECT_EQ(stats["seed_rows"], kSeedRows);
-    EXPECT_EQ(stats["seed"], kSeedRows);
-    EXPECT_EQ(stats["sources"]["seed"]["total"], kSeedRows);
-    EXPECT_GT(stats["seed_episodes"], 0);
+    EXPECT_EQ(stats["seed_buffer_rows"], kSeedBufferRows);
+    EXPECT_EQ(stats["seed_buffer"], kSeedBufferRows);
+    EXPECT_EQ(stats["sources"]["seed_buffer"]["total"], kSeedBufferRows);
+    EXPECT_GT(stats["seed_buffer_episodes"], 0);
   }
 
   TempDir folder_;
-  const std::string seed_ = folder_ / "seed.hdf5";
+  const std::string seed_buffer_ = folder_ / "seed.hdf5";
   const RunFolder run_{folder_ / "run"};
 };
 
 TEST_F(FinetuneTest, GoesOnlineAfterTheOfflinePhaseAndKeepsItsSeedOverAResume) {
   DbrProcess launch("dbr", Arguments({"--set", "launch.max_steps=1000000"}));
   ASSERT_TRUE(launch.AwaitOutput("offline phase over")) << launch.output();
-  EXPECT_THAT(launch.output(), AllOf(HasSubstr(absl::StrCat("seed buffer: ", seed_)),
-                                     HasSubstr("the seed holds 3,000 transitions")));
-  // More comes in than the buffer has room for, and the seed stays.
+  EXPECT_THAT(launch.output(), AllOf(HasSubstr(absl::StrCat("seed buffer: ", seed_buffer_)),
+                                     HasSubstr("the seed buffer holds 3,000 transitions")));
+  // More comes in than the buffer has room for, and the seed buffer stays.
   Json stats;
   ASSERT_TRUE(launch.Await([&] {
     stats = Stats(run_);
     return stats.is_object() && stats["evicted"] > 0;
   })) << launch.output();
-  ExpectWholeSeed(stats);
+  ExpectWholeSeedBuffer(stats);
   EXPECT_EQ(stats["total"], 4000);
-  EXPECT_EQ(stats["sources"]["seed"]["share"], 0.75);
+  EXPECT_EQ(stats["sources"]["seed_buffer"]["share"], 0.75);
   EXPECT_EQ(stats["sources"]["online"]["total"], 1000);
   EXPECT_GE(stats["sampled_offline"], kOfflineUpdates * 32);
-  EXPECT_GT(stats["sources"]["seed"]["plus"], 0);
-  EXPECT_GT(stats["sources"]["seed"]["minus"], 0);
+  EXPECT_GT(stats["sources"]["seed_buffer"]["plus"], 0);
+  EXPECT_GT(stats["sources"]["seed_buffer"]["minus"], 0);
   EXPECT_LE(stats["samples_per_insert"], 96 + 9.6) << "the offline phase does not count";
   launch.Signal(SIGINT);
   EXPECT_EQ(launch.Wait(), 130) << launch.output();
@@ -83,8 +83,8 @@ TEST_F(FinetuneTest, GoesOnlineAfterTheOfflinePhaseAndKeepsItsSeedOverAResume) {
   EXPECT_GT(first["transitions"], 1000);
   EXPECT_GE(first["updates"], kOfflineUpdates);
   EXPECT_EQ(first["restarts"], 0);
-  EXPECT_EQ(first["seed_buffer"]["path"], seed_);
-  EXPECT_EQ(first["returns"]["seed"], stats["seed_return_mean"]);
+  EXPECT_EQ(first["seed_buffer"]["path"], seed_buffer_);
+  EXPECT_EQ(first["returns"]["seed_buffer"], stats["seed_buffer_return_mean"]);
   EXPECT_TRUE(first["returns"]["end"].is_null());
 
   const std::uint64_t steps = first["transitions"].get<std::uint64_t>() + 300;
@@ -92,13 +92,13 @@ TEST_F(FinetuneTest, GoesOnlineAfterTheOfflinePhaseAndKeepsItsSeedOverAResume) {
                                                    absl::StrCat("launch.max_steps=", steps)});
   ASSERT_EQ(status, 0) << output;
   EXPECT_THAT(output,
-              AllOf(HasSubstr("reached max_steps"), HasSubstr("of the seed"), HasSubstr("at the end")));
+              AllOf(HasSubstr("reached max_steps"), HasSubstr("of the seed buffer"), HasSubstr("at the end")));
   const Json second = Summary(run_);
   EXPECT_EQ(second["ended"], "max_steps");
   EXPECT_EQ(second["launches"], 2);
   EXPECT_GE(second["transitions"], steps);
   EXPECT_GT(second["updates"], first["updates"]);
-  EXPECT_EQ(second["seed_buffer"]["rows"], kSeedRows);
+  EXPECT_EQ(second["seed_buffer"]["rows"], kSeedBufferRows);
   EXPECT_GE(second["evaluations"].size(), first["evaluations"].size());
   EXPECT_TRUE(second["returns"]["end"]["mean"].is_number());
   EXPECT_EQ(second["final"][0]["episodes"], 4);
@@ -125,7 +125,7 @@ TEST_F(FinetuneTest, ResumesInTheOfflinePhase) {
   const Json second = Summary(run_);
   EXPECT_EQ(second["ended"], "max_steps");
   EXPECT_GE(second["updates"], first["updates"]);
-  EXPECT_EQ(second["seed_buffer"]["rows"], kSeedRows);
+  EXPECT_EQ(second["seed_buffer"]["rows"], kSeedBufferRows);
 }
 
 TEST_F(FinetuneTest, OfflineAloneStartsNoActors) {

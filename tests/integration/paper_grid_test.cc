@@ -23,7 +23,7 @@ class PaperGridTest : public testing::Test {
  protected:
   // Short stretches of random actions stand for the data of every quality: what is learned does not count
   // here.
-  void RecordSeeds() const {
+  void RecordSeedBuffers() const {
     std::filesystem::create_directory(data_);
     for (const std::string& robot : {"hopper", "walker2d", "half_cheetah", "ant"}) {
       const std::string first = absl::StrCat(data_, "/", robot, "-random.hdf5");
@@ -47,7 +47,7 @@ class PaperGridTest : public testing::Test {
 };
 
 TEST_F(PaperGridTest, EveryCellRunsIsNotRunTwiceAndIsInTheReport) {
-  RecordSeeds();
+  RecordSeedBuffers();
   auto [status, output] = Experiment();
   EXPECT_EQ(status, 0) << output;
   EXPECT_THAT(output, HasSubstr(absl::StrCat(kCells, " of ", kCells, " cells done")));

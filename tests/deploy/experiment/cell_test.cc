@@ -120,11 +120,11 @@ TEST_F(CellTest, FieldsWithoutInfluenceAndWrittenDefaultsMakeNoOtherConfig) {
   other.mutable_learner()->set_checkpoint_every_s(3);
   other.mutable_algorithm()->set_threads(2);
   other.mutable_algorithm()->mutable_dbr()->set_epsilon(0.05);  // the default
-  other.mutable_replay()->mutable_seed()->set_path("/other/folder/hopper.hdf5");
-  cell_.config.mutable_replay()->mutable_seed()->set_path("/folder/hopper.hdf5");
+  other.mutable_replay()->mutable_seed_buffer()->set_path("/other/folder/hopper.hdf5");
+  cell_.config.mutable_replay()->mutable_seed_buffer()->set_path("/folder/hopper.hdf5");
   MakeRun(other, "max_episodes", /*with_results=*/true);
   EXPECT_EQ(State(), CellState::kDone) << ReadStanding(cell_).difference;
-  cell_.config.mutable_replay()->mutable_seed()->set_path("/folder/walker.hdf5");
+  cell_.config.mutable_replay()->mutable_seed_buffer()->set_path("/folder/walker.hdf5");
   EXPECT_THAT(ReadStanding(cell_).difference, HasSubstr("\"hopper.hdf5\" -> \"walker.hdf5\""));
 }
 

@@ -33,9 +33,9 @@ RunSample Sample(std::uint64_t updates, std::uint64_t steps) {
   RunSample sample;
   sample.replay = StatsReply();
   sample.replay->set_inserted(steps);
-  sample.replay->set_seed_rows(1000000);
-  sample.replay->set_seed_episodes(1012);
-  sample.replay->set_seed_return_mean(1078.3);
+  sample.replay->set_seed_buffer_rows(1000000);
+  sample.replay->set_seed_buffer_episodes(1012);
+  sample.replay->set_seed_buffer_return_mean(1078.3);
   sample.learner = LearnerStatus();
   sample.learner->set_updates(updates);
   return sample;
@@ -186,14 +186,14 @@ TEST(RobotResultsTest, TheSummaryHoldsTheCurveAndThePhases) {
   EXPECT_THAT(read.Update(Evaluated(Sample(3100, 1600), 3, 3000, 1500)), IsEmpty()) << "known from before";
 }
 
-TEST(SeedStatsTest, TellOfTheSharesOfTheSeed) {
+TEST(SeedBufferStatsTest, TellOfTheSharesOfTheSeed) {
   StatsReply stats = *Sample(0, 25).replay;
   stats.set_total(100);
   stats.set_plus(40);
   stats.set_minus(50);
-  stats.set_seed(75);
-  stats.set_seed_plus(10);
-  stats.set_seed_minus(25);
+  stats.set_seed_buffer(75);
+  stats.set_seed_buffer_plus(10);
+  stats.set_seed_buffer_minus(25);
   const std::string text = StatsText("unix:run/replay.sock", stats);
   EXPECT_THAT(text, AllOf(HasSubstr("75% of D,  25% of D+,  50% of D-"),
                           HasSubstr("1,000,000 transitions came in"), HasSubstr("1078.3")));
@@ -201,8 +201,8 @@ TEST(SeedStatsTest, TellOfTheSharesOfTheSeed) {
   EXPECT_EQ(json["sources"]["seed"]["share"], 0.75);
   EXPECT_EQ(json["sources"]["seed"]["plus_share"], 0.25);
   EXPECT_EQ(json["sources"]["online"]["minus_share"], 0.5);
-  EXPECT_EQ(json["seed_rows"], 1000000);
-  EXPECT_EQ(json["seed_return_mean"], 1078.3);
+  EXPECT_EQ(json["seed_buffer_rows"], 1000000);
+  EXPECT_EQ(json["seed_buffer_return_mean"], 1078.3);
 }
 
 }  // namespace

@@ -102,8 +102,8 @@ TEST_F(StoreEpisodesTest, WhatWasEvictedIsMissingAtTheFront) {
 TEST_F(StoreEpisodesTest, RowsOfASeedAreLeftOut) {
   Open(10);
   const std::vector<float> row(kLayout.stride(), 9.0f);
-  store_->AppendSeed(row.data(), {.source = Source::kSeed});
-  store_->CompleteSeed({}, /*pin=*/true);
+  store_->AppendSeedBuffer(row.data(), {.source = Source::kSeedBuffer});
+  store_->CompleteSeedBuffer({}, /*pin=*/true);
   Add(1, 0, /*terminal=*/true);
   const std::vector<StoreEpisode> episodes = LinkEpisodes(*store_, kMaxEpisodeSteps);
   ASSERT_EQ(episodes.size(), 1);

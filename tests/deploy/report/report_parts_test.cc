@@ -195,10 +195,10 @@ TEST(SettingsTest, ListsWhatIsNotAtItsDefaultAndTellsConfigsApart) {
 
 TEST(SettingsTest, WhereTheOfflineDataLiesChangesNothing) {
   Config config;
-  config.mutable_replay()->mutable_seed()->set_path("/here/hopper-medium.hdf5");
+  config.mutable_replay()->mutable_seed_buffer()->set_path("/here/hopper-medium.hdf5");
   const Settings here = SettingsOf(config);
-  EXPECT_EQ(here.differences, "replay.seed.path: \"hopper-medium.hdf5\"\n");
-  config.mutable_replay()->mutable_seed()->set_path("hopper-medium.hdf5");
+  EXPECT_EQ(here.differences, "replay.seed_buffer.path: \"hopper-medium.hdf5\"\n");
+  config.mutable_replay()->mutable_seed_buffer()->set_path("hopper-medium.hdf5");
   EXPECT_EQ(SettingsOf(config).digest, here.digest);
 }
 

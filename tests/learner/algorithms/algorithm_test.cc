@@ -24,7 +24,7 @@ AlgorithmSpec SpecOf(const AlgorithmId& id, std::uint64_t seed = 1) {
   AlgorithmSpec spec = SmallSpec(seed, id.actions);
   if (id.name == "sac") spec.config.mutable_sac();
   if (id.name == "ddqn") spec.config.mutable_ddqn();
-  if (id.name == "sac_discrete") spec.config.mutable_sac_discrete();
+  if (id.name == "discrete_sac") spec.config.mutable_discrete_sac();
   if (id.name == "bear") {
     BearConfig* bear = spec.config.mutable_bear();
     bear->set_warm_start_updates(2);

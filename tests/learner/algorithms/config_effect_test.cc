@@ -92,9 +92,9 @@ constexpr Effect kEffects[] = {
     {"awac", "max_weight", "max_weight: 0.5"},
     {"awac", "value_samples", "value_samples: 3"},
 
-    {"sac_discrete", "first_temperature", "first_temperature: 0.1"},
-    {"sac_discrete", "temperature_learning_rate", "temperature_learning_rate: 0.1"},
-    {"sac_discrete", "target_entropy_ratio", "target_entropy_ratio: 0.1", "temperature_learning_rate: 0.1"},
+    {"discrete_sac", "first_temperature", "first_temperature: 0.1"},
+    {"discrete_sac", "temperature_learning_rate", "temperature_learning_rate: 0.1"},
+    {"discrete_sac", "target_entropy_ratio", "target_entropy_ratio: 0.1", "temperature_learning_rate: 0.1"},
 };
 
 AlgorithmSpec SpecOf(const std::string& algorithm, const std::string& settings, ActionKind actions) {

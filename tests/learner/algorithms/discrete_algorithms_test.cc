@@ -64,14 +64,14 @@ TEST_F(DdqnTinyProblem, TheFirstTargetIsTheTargetNetworksViewOfTheOnlineNetworks
   EXPECT_NEAR(ddqn.metrics()[2].value, sum / 16, 1e-5);
 }
 
-using SacDiscreteTinyProblem = TinyProblem;
+using DiscreteSacTinyProblem = TinyProblem;
 
 // With a fixed temperature T the soft values are V(s) = T log sum_a exp(Q(s, a) / T), and pi the softmax of Q
 // / T.
-TEST_F(SacDiscreteTinyProblem, ATwoStateChainHasItsClosedFormSoftValues) {
+TEST_F(DiscreteSacTinyProblem, ATwoStateChainHasItsClosedFormSoftValues) {
   constexpr double kTemperature = 0.5;
-  config_.mutable_sac_discrete()->set_first_temperature(kTemperature);
-  config_.mutable_sac_discrete()->set_temperature_learning_rate(0);
+  config_.mutable_discrete_sac()->set_first_temperature(kTemperature);
+  config_.mutable_discrete_sac()->set_temperature_learning_rate(0);
   Train(Chain(), 2, 2, 2000);
   const double v1 = kTemperature * std::log(std::exp(1 / kTemperature) + std::exp(-1 / kTemperature));
   const auto share = [&](double q, double other) { return 1 / (1 + std::exp((other - q) / kTemperature)); };
@@ -84,8 +84,8 @@ TEST_F(SacDiscreteTinyProblem, ATwoStateChainHasItsClosedFormSoftValues) {
 }
 
 // Two of three actions are legal: the target is a share of log 2, not of log 3.
-TEST_F(SacDiscreteTinyProblem, TheTemperatureBringsTheEntropyToItsTarget) {
-  SacDiscreteConfig* sac = config_.mutable_sac_discrete();
+TEST_F(DiscreteSacTinyProblem, TheTemperatureBringsTheEntropyToItsTarget) {
+  DiscreteSacConfig* sac = config_.mutable_discrete_sac();
   sac->set_temperature_learning_rate(3e-3);
   sac->set_target_entropy_ratio(0.5);
   const std::vector<Step> steps = {{0, 0, 0, 0, 0}, {0, 1, 1, 0, 0}};

@@ -78,9 +78,9 @@ AlgorithmConfig ProblemSolvingConfig(const AlgorithmId& id) {
     config.mutable_awac()->set_value_samples(4);
   } else if (id.name == "ddqn") {
     config.mutable_ddqn();
-  } else if (id.name == "sac_discrete") {
-    config.mutable_sac_discrete()->set_first_temperature(0.02);
-    config.mutable_sac_discrete()->set_temperature_learning_rate(0);
+  } else if (id.name == "discrete_sac") {
+    config.mutable_discrete_sac()->set_first_temperature(0.02);
+    config.mutable_discrete_sac()->set_temperature_learning_rate(0);
   } else {
     ADD_FAILURE() << "give the new algorithm '" << id.name << "' its config here";
   }

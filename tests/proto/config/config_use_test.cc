@@ -28,7 +28,7 @@ const std::map<std::string, std::vector<std::string>>& Readers() {
       {"AlgorithmConfig", {"actor", "learner", "replay"}},
       {"DbrConfig", {"learner", "replay"}},
       {"ReplayConfig", {"replay"}},
-      {"SeedConfig", {"replay"}},
+      {"SeedBufferConfig", {"replay"}},
       {"LearnerConfig", {"learner", "deploy"}},
       {"ActorConfig", {"actor", "deploy"}},
       {"EvaluationConfig", {"actor", "deploy"}},

@@ -98,7 +98,7 @@ TEST_F(StoreInAFile, KeepsTheNewestRows) {
 TEST_F(StoreInAFile, ResumesRowsCountersWritersAndEpisodes) {
   {
     auto store = Open();
-    ASSERT_EQ(store->writers().Open({.id = 7, .name = "actor-0", .source = Source::kSeed}).value(), 0u);
+    ASSERT_EQ(store->writers().Open({.id = 7, .name = "actor-0", .source = Source::kSeedBuffer}).value(), 0u);
     Append(store.get(), 1, 130);
     store->writers().record(0).last_sequence = 135;  // five more that were refused
     store->counters().sampled = 1234;

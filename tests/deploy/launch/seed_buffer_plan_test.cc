@@ -26,7 +26,7 @@ const absl::Time kNow = absl::FromUnixSeconds(1700000000);
 constexpr int kSteps = 50;
 
 // One episode of hopper's sizes.
-void WriteSeed(const std::string& path, int observation_size = 15) {
+void WriteSeedBuffer(const std::string& path, int observation_size = 15) {
   const EnvSpec env{.name = "hopper",
                     .observation_size = observation_size,
                     .actions = {ActionKind::kContinuous, 3},
@@ -39,18 +39,18 @@ void WriteSeed(const std::string& path, int observation_size = 15) {
   ASSERT_TRUE((*writer)->Finish().ok());
 }
 
-class SeedPlanTest : public testing::Test {
+class SeedBufferPlanTest : public testing::Test {
  protected:
-  SeedPlanTest() {
+  SeedBufferPlanTest() {
     EXPECT_TRUE(WriteFileAtomically(config_,
                                     "env { name: 'hopper' } replay { capacity: 5000 min_size: 10 } "
                                     "learner { offline_updates: 100 } actor { processes: 2 }")
                     .ok());
-    WriteSeed(seed_);
+    WriteSeedBuffer(seed_buffer_);
   }
 
-  LaunchOptions Options(const std::string& seed, std::vector<std::string> overrides = {}) const {
-    return {.config = config_, .overrides = std::move(overrides), .run_dir = run_, .seed_buffer = seed};
+  LaunchOptions Options(const std::string& seed_buffer, std::vector<std::string> overrides = {}) const {
+    return {.config = config_, .overrides = std::move(overrides), .run_dir = run_, .seed_buffer = seed_buffer};
   }
   // Why there is no plan, and no folder.
   std::string Refusal(const LaunchOptions& options) const {
@@ -63,10 +63,10 @@ class SeedPlanTest : public testing::Test {
   TempDir folder_;
   const std::string config_ = folder_ / "config.textproto";
   const std::string run_ = folder_ / "run";
-  const std::string seed_ = folder_ / "seed.hdf5";
+  const std::string seed_buffer_ = folder_ / "seed.hdf5";
 };
 
-TEST_F(SeedPlanTest, TheEffectiveConfigNamesTheSeedByItsAbsolutePath) {
+TEST_F(SeedBufferPlanTest, TheEffectiveConfigNamesTheSeedByItsAbsolutePath) {
   std::filesystem::current_path(folder_.path());
   LaunchOptions options = Options("./seed.hdf5");
   options.seed_layout = "d4rl";
@@ -75,64 +75,64 @@ TEST_F(SeedPlanTest, TheEffectiveConfigNamesTheSeedByItsAbsolutePath) {
   ASSERT_TRUE(plan.ok()) << plan.status();
   const auto written = LoadConfig(plan->folder.config());
   ASSERT_TRUE(written.ok()) << written.status();
-  EXPECT_EQ(written->replay().seed().path(), std::filesystem::current_path() / "seed.hdf5");
-  EXPECT_EQ(written->replay().seed().layout(), "d4rl");
-  EXPECT_TRUE(written->replay().seed().skip_bad_rows());
+  EXPECT_EQ(written->replay().seed_buffer().path(), std::filesystem::current_path() / "seed.hdf5");
+  EXPECT_EQ(written->replay().seed_buffer().layout(), "d4rl");
+  EXPECT_TRUE(written->replay().seed_buffer().skip_bad_rows());
   EXPECT_THAT(Actors(*plan, "bin"), SizeIs(2));
 }
 
-TEST_F(SeedPlanTest, TheConfigsOwnSeedIsMadeAbsoluteToo) {
+TEST_F(SeedBufferPlanTest, TheConfigsOwnSeedIsMadeAbsoluteToo) {
   std::filesystem::current_path(folder_.path());
-  const auto plan = PrepareRun(Options("", {"replay.seed.path=seed.hdf5"}), kNow);
+  const auto plan = PrepareRun(Options("", {"replay.seed_buffer.path=seed.hdf5"}), kNow);
   ASSERT_TRUE(plan.ok()) << plan.status();
-  EXPECT_EQ(plan->config.replay().seed().path(), std::filesystem::current_path() / "seed.hdf5");
+  EXPECT_EQ(plan->config.replay().seed_buffer().path(), std::filesystem::current_path() / "seed.hdf5");
 }
 
-TEST_F(SeedPlanTest, UpdatesOnASeedNeedOne) {
+TEST_F(SeedBufferPlanTest, UpdatesOnASeedNeedOne) {
   EXPECT_THAT(Refusal(Options("")), AllOf(HasSubstr("learner.offline_updates"), HasSubstr("--seed-buffer"),
                                           HasSubstr("dbr dataset record --env hopper")));
 }
 
-TEST_F(SeedPlanTest, FlagsForASeedNeedOne) {
+TEST_F(SeedBufferPlanTest, FlagsForASeedNeedOne) {
   LaunchOptions options = Options("", {"learner.offline_updates=0"});
   options.skip_bad_rows = true;
   EXPECT_THAT(Refusal(options), HasSubstr("--seed-buffer"));
 }
 
-TEST_F(SeedPlanTest, WhereEveryUpdateIsOfflineThereAreNoActors) {
-  const auto plan = PrepareRun(Options(seed_, {"learner.max_updates=100"}), kNow);
+TEST_F(SeedBufferPlanTest, WhereEveryUpdateIsOfflineThereAreNoActors) {
+  const auto plan = PrepareRun(Options(seed_buffer_, {"learner.max_updates=100"}), kNow);
   ASSERT_TRUE(plan.ok()) << plan.status();
   EXPECT_EQ(plan->actors, 0);
   EXPECT_THAT(Actors(*plan, "bin"), IsEmpty());
   EXPECT_THAT(Services(*plan, "bin"), SizeIs(3));
 }
 
-TEST_F(SeedPlanTest, ABadSeedIsRefusedBeforeAFolderIsMade) {
+TEST_F(SeedBufferPlanTest, ABadSeedIsRefusedBeforeAFolderIsMade) {
   EXPECT_THAT(Refusal(Options(folder_ / "none.hdf5")), HasSubstr("none.hdf5"));
   EXPECT_THAT(Refusal(Options(config_)), HasSubstr("config.textproto"));
-  EXPECT_THAT(Refusal(Options(seed_, {"replay.capacity=49", "replay.min_size=1"})),
+  EXPECT_THAT(Refusal(Options(seed_buffer_, {"replay.capacity=49", "replay.min_size=1"})),
               AllOf(HasSubstr("has 50 transitions"), HasSubstr("room for 49")));
-  EXPECT_THAT(Refusal(Options(seed_, {"replay.capacity=50", "replay.min_size=1"})),
-              HasSubstr("replay.seed.evict"));
-  EXPECT_THAT(Refusal(Options(seed_, {"replay.min_size=51"})), HasSubstr("expected at least 51"));
-  WriteSeed(seed_, 22);
-  EXPECT_THAT(Refusal(Options(seed_)),
+  EXPECT_THAT(Refusal(Options(seed_buffer_, {"replay.capacity=50", "replay.min_size=1"})),
+              HasSubstr("replay.seed_buffer.evict"));
+  EXPECT_THAT(Refusal(Options(seed_buffer_, {"replay.min_size=51"})), HasSubstr("expected at least 51"));
+  WriteSeedBuffer(seed_buffer_, 22);
+  EXPECT_THAT(Refusal(Options(seed_buffer_)),
               AllOf(HasSubstr("expected observations of 15"), HasSubstr("found 22")));
 }
 
-TEST_F(SeedPlanTest, AResumedRunKeepsItsSeed) {
-  ASSERT_TRUE(PrepareRun(Options(seed_), kNow).ok());
+TEST_F(SeedBufferPlanTest, AResumedRunKeepsItsSeed) {
+  ASSERT_TRUE(PrepareRun(Options(seed_buffer_), kNow).ok());
   ASSERT_TRUE(WriteFileAtomically(RunFolder{run_}.replay_store(), "its rows").ok());
-  std::filesystem::remove(seed_);  // it lies in the store by now
+  std::filesystem::remove(seed_buffer_);  // it lies in the store by now
   LaunchOptions resume{.run_dir = run_, .resume = true};
   EXPECT_TRUE(PrepareRun(resume, kNow).ok());
   resume.seed_buffer = folder_ / "other.hdf5";
   const auto other = PrepareRun(resume, kNow);
   EXPECT_EQ(other.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(std::string(other.status().message()),
-              AllOf(HasSubstr("replay.seed.path"), HasSubstr("other.hdf5")));
+              AllOf(HasSubstr("replay.seed_buffer.path"), HasSubstr("other.hdf5")));
   resume.seed_buffer.clear();
-  resume.overrides = {"replay.seed.share=0.5"};
+  resume.overrides = {"replay.seed_buffer.share=0.5"};
   EXPECT_TRUE(PrepareRun(resume, kNow).ok()) << "how it is drawn may change";
 }
 

@@ -1,4 +1,4 @@
-#include "learner/algorithms/sac_discrete.h"
+#include "learner/algorithms/discrete_sac.h"
 
 #include "learner/algorithms/algorithm_adapter.h"
 #include "learner/objectives/critic_target.h"
@@ -12,11 +12,11 @@ constexpr int kSmaller = 1;  // the weight of the smaller twin in a value: all
 }  // namespace
 
 template <class Scalar>
-SacDiscrete<Scalar>::SacDiscrete(const AlgorithmSpec& spec)
-    : Base(SoftNetworks<Scalar>::Metrics(), spec, spec.config.sac_discrete()) {}
+DiscreteSac<Scalar>::DiscreteSac(const AlgorithmSpec& spec)
+    : Base(SoftNetworks<Scalar>::Metrics(), spec, spec.config.discrete_sac()) {}
 
 template <class Scalar>
-absl::Status SacDiscrete<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
+absl::Status DiscreteSac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
                                          const BasicBatch<Scalar>&) {
   networks_.Begin();
   ComputeTarget(uniform);
@@ -25,13 +25,13 @@ absl::Status SacDiscrete<Scalar>::Update(const BasicBatch<Scalar>& uniform, cons
         return CriticLoss<Scalar>(q, uniform.actions, target_, d_q);
       });
   const SoftPolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
-  const auto ratio = static_cast<Scalar>(networks_.spec.config.sac_discrete().target_entropy_ratio());
+  const auto ratio = static_cast<Scalar>(networks_.spec.config.discrete_sac().target_entropy_ratio());
   networks_.Finish(policy_loss, ratio * MeanGreatestEntropy<Scalar>(uniform.masks));
   return networks_.Report(critic_loss, policy_loss, target_.mean(), &metrics_);
 }
 
 template <class Scalar>
-void SacDiscrete<Scalar>::ComputeTarget(const BasicBatch<Scalar>& batch) {
+void DiscreteSac<Scalar>::ComputeTarget(const BasicBatch<Scalar>& batch) {
   MaskedSoftmax<Scalar>(networks_.policy.Evaluate(batch.next_observations), batch.next_masks, &next_pi_);
   networks_.critics.EvaluateTargets(batch.next_observations);
   ExpectedTargetValue<Scalar>(next_pi_, networks_.critics.target1(), networks_.critics.target2(), kSmaller,
@@ -43,7 +43,7 @@ void SacDiscrete<Scalar>::ComputeTarget(const BasicBatch<Scalar>& batch) {
 
 // And what every transition's advantage is.
 template <class Scalar>
-SoftPolicyLoss<Scalar> SacDiscrete<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
+SoftPolicyLoss<Scalar> DiscreteSac<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
   const MatrixX<Scalar>&q1 = networks_.critics.q1(), &q2 = networks_.critics.q2();
   MaskedSoftmax<Scalar>(networks_.policy.Forward(batch.observations), batch.masks, &pi_);
   const SoftPolicyLoss<Scalar> loss =
@@ -54,11 +54,11 @@ SoftPolicyLoss<Scalar> SacDiscrete<Scalar>::ImprovePolicy(const BasicBatch<Scala
   return loss;
 }
 
-template class SacDiscrete<float>;
-template class SacDiscrete<double>;
+template class DiscreteSac<float>;
+template class DiscreteSac<double>;
 
-std::unique_ptr<Algorithm> MakeSacDiscrete(const AlgorithmSpec& spec) {
-  return std::make_unique<AlgorithmAdapter<SacDiscrete>>(spec);
+std::unique_ptr<Algorithm> MakeDiscreteSac(const AlgorithmSpec& spec) {
+  return std::make_unique<AlgorithmAdapter<DiscreteSac>>(spec);
 }
 
 }  // namespace dbr

@@ -6,8 +6,8 @@
 namespace dbr {
 
 // As it lies in the store's file. Returns are those of the data's whole episodes; NaN where it has none.
-struct SeedRecord {
-  std::uint64_t complete = 0;  // 1 once all of the seed is in the store
+struct SeedBufferRecord {
+  std::uint64_t complete = 0;  // 1 once all of the seed buffer is in the store
   std::uint64_t rows = 0;      // the rows with the keys 1 to `rows`
   std::uint64_t pinned = 0;    // of them, never evicted: all or none
   std::uint64_t bad_rows = 0;  // left out: with values that are not finite

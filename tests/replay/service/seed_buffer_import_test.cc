@@ -1,5 +1,5 @@
 // A replay server that begins with a file of offline data, and what it says of bad ones.
-#include "replay/service/seed_import.h"
+#include "replay/service/seed_buffer_import.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -29,17 +29,17 @@ constexpr absl::Duration kPatience = absl::Seconds(60);
 constexpr TransitionLayout kLayout{.observation_width = kTestObservationSize,
                                    .action_width = kTestActionWidth};
 
-class SeedImportTest : public ::testing::Test {
+class SeedBufferImportTest : public ::testing::Test {
  protected:
-  SeedImportTest() : episodes_(MakeEpisodes(1, 3000)), expected_(Expected(episodes_, 0.75f)) {
+  SeedBufferImportTest() : episodes_(MakeEpisodes(1, 3000)), expected_(Expected(episodes_, 0.75f)) {
     WriteWithWriter(path_, episodes_, DatasetLayout::kD4rl);
     options_.store = {.path = absl::StrCat(folder_.path(), "/replay.store"),
                       .env = "test_robot",
                       .layout = kLayout,
                       .capacity = 10000};
-    options_.seed.path = path_;
-    options_.seed.env = "test_robot";
-    options_.seed.discount = 0.75f;
+    options_.seed_buffer.path = path_;
+    options_.seed_buffer.env = "test_robot";
+    options_.seed_buffer.discount = 0.75f;
     options_.server.address = absl::StrCat("unix:", folder_.path(), "/replay.sock");
   }
 
@@ -72,7 +72,7 @@ class SeedImportTest : public ::testing::Test {
   std::unique_ptr<ReplayServer> server_;
 };
 
-TEST_F(SeedImportTest, HoldsEveryTransitionOfTheFile) {
+TEST_F(SeedBufferImportTest, HoldsEveryTransitionOfTheFile) {
   Start();
   ReplayClient client(options_.server.address);
   DrawnBatches drawn;
@@ -87,7 +87,7 @@ TEST_F(SeedImportTest, HoldsEveryTransitionOfTheFile) {
   }
 }
 
-TEST_F(SeedImportTest, RowsCarryTheReturnsOfTheirEpisodesWhereTheyAreWanted) {
+TEST_F(SeedBufferImportTest, RowsCarryTheReturnsOfTheirEpisodesWhereTheyAreWanted) {
   options_.store.layout.return_width = 1;
   Start();
   std::vector<double> returns(rows());
@@ -115,7 +115,7 @@ TEST_F(SeedImportTest, RowsCarryTheReturnsOfTheirEpisodesWhereTheyAreWanted) {
   }
 }
 
-TEST_F(SeedImportTest, AnImportWithReturnsThatWasBrokenOffGoesOnWithinAnEpisode) {
+TEST_F(SeedBufferImportTest, AnImportWithReturnsThatWasBrokenOffGoesOnWithinAnEpisode) {
   options_.store.layout.return_width = 1;
   const TransitionLayout layout = options_.store.layout;
   Start();
@@ -132,7 +132,7 @@ TEST_F(SeedImportTest, AnImportWithReturnsThatWasBrokenOffGoesOnWithinAnEpisode)
   const std::size_t some = static_cast<std::size_t>(episodes_[0].steps() + episodes_[1].steps()) + 1;
   {
     auto buffer = *PartitionedBuffer::Make(*TransitionStore::Open(options_.store), {});
-    ASSERT_TRUE(buffer->InsertSeed(absl::MakeConstSpan(whole).first(some * layout.stride())).ok());
+    ASSERT_TRUE(buffer->InsertSeedBuffer(absl::MakeConstSpan(whole).first(some * layout.stride())).ok());
   }
   options_.store.resume = true;
   Start();
@@ -145,34 +145,34 @@ TEST_F(SeedImportTest, AnImportWithReturnsThatWasBrokenOffGoesOnWithinAnEpisode)
   }
 }
 
-TEST_F(SeedImportTest, ReturnsOfCutEpisodesNeedADiscountBelowOne) {
+TEST_F(SeedBufferImportTest, ReturnsOfCutEpisodesNeedADiscountBelowOne) {
   options_.store.layout.return_width = 1;
-  options_.seed.discount = 1;
+  options_.seed_buffer.discount = 1;
   EXPECT_THAT(StartError().ToString(), HasSubstr("algorithm.discount: expected below 1"));
 }
 
-TEST_F(SeedImportTest, StatsTellOfTheSeedApart) {
+TEST_F(SeedBufferImportTest, StatsTellOfTheSeedBufferApart) {
   Start();
   const StatsReply stats = Stats();
   EXPECT_EQ(stats.total(), rows());
-  EXPECT_EQ(stats.seed(), rows());
-  EXPECT_EQ(stats.seed_rows(), rows());
+  EXPECT_EQ(stats.seed_buffer(), rows());
+  EXPECT_EQ(stats.seed_buffer_rows(), rows());
   EXPECT_EQ(stats.unjudged(), rows());
   EXPECT_EQ(stats.inserted(), 0u);
   EXPECT_EQ(stats.episodes(), 0u);
   EXPECT_TRUE(std::isnan(stats.recent_return_mean()));
-  EXPECT_EQ(stats.seed_episodes(), static_cast<std::uint64_t>(expected_.facts.episodes));
-  EXPECT_NEAR(stats.seed_return_mean(), expected_.facts.return_mean, 1e-6);
-  EXPECT_NEAR(stats.seed_return_max(), expected_.facts.return_max, 1e-6);
-  EXPECT_GT(stats.seed_rows_per_second(), 0);
+  EXPECT_EQ(stats.seed_buffer_episodes(), static_cast<std::uint64_t>(expected_.facts.episodes));
+  EXPECT_NEAR(stats.seed_buffer_return_mean(), expected_.facts.return_mean, 1e-6);
+  EXPECT_NEAR(stats.seed_buffer_return_max(), expected_.facts.return_max, 1e-6);
+  EXPECT_GT(stats.seed_buffer_rows_per_second(), 0);
   ASSERT_EQ(stats.writers_size(), 1);
-  EXPECT_EQ(stats.writers(0).name(), "seed");
-  EXPECT_EQ(stats.writers(0).source(), SEED);
+  EXPECT_EQ(stats.writers(0).name(), "seed_buffer");
+  EXPECT_EQ(stats.writers(0).source(), SEED_BUFFER);
 }
 
-TEST_F(SeedImportTest, AResumedServerDoesNotLoadItAgain) {
+TEST_F(SeedBufferImportTest, AResumedServerDoesNotLoadItAgain) {
   Start();
-  const SeedRecord first = server_->seed();
+  const SeedBufferRecord first = server_->seed_buffer();
   WriterOptions writer_options;
   writer_options.address = options_.server.address;
   writer_options.name = "actor-0";
@@ -185,25 +185,25 @@ TEST_F(SeedImportTest, AResumedServerDoesNotLoadItAgain) {
   ASSERT_TRUE(writer.Flush(kPatience).ok());
   unlink(path_.c_str());
   Start();
-  EXPECT_EQ(server_->seed().rows_per_second, first.rows_per_second);
+  EXPECT_EQ(server_->seed_buffer().rows_per_second, first.rows_per_second);
   EXPECT_EQ(Stats().total(), rows() + 50);
-  EXPECT_EQ(Stats().seed(), rows());
+  EXPECT_EQ(Stats().seed_buffer(), rows());
   EXPECT_EQ(Stats().inserted(), 50u);
 }
 
-TEST_F(SeedImportTest, GoesOnWithAnImportThatWasBrokenOff) {
+TEST_F(SeedBufferImportTest, GoesOnWithAnImportThatWasBrokenOff) {
   {
     auto buffer = *PartitionedBuffer::Make(*TransitionStore::Open(options_.store), {});
     const std::uint64_t some = rows() / 3;
     std::vector<float> flat;
     for (std::uint64_t i = 0; i < some; ++i)
       flat.insert(flat.end(), expected_.rows[i].begin(), expected_.rows[i].end());
-    ASSERT_TRUE(buffer->InsertSeed(flat).ok());
+    ASSERT_TRUE(buffer->InsertSeedBuffer(flat).ok());
   }
   options_.store.resume = true;
   Start();
   EXPECT_EQ(Stats().total(), rows());
-  EXPECT_EQ(Stats().seed_episodes(), static_cast<std::uint64_t>(expected_.facts.episodes));
+  EXPECT_EQ(Stats().seed_buffer_episodes(), static_cast<std::uint64_t>(expected_.facts.episodes));
   ReplayClient client(options_.server.address);
   DrawnBatches drawn;
   ASSERT_TRUE(client.Sample({.uniform = 2000}, kLayout, kPatience, &drawn).ok());
@@ -212,7 +212,7 @@ TEST_F(SeedImportTest, GoesOnWithAnImportThatWasBrokenOff) {
   }
 }
 
-TEST_F(SeedImportTest, ASeedLargerThanTheCapacityIsRefusedWithBothNumbers) {
+TEST_F(SeedBufferImportTest, ASeedLargerThanTheCapacityIsRefusedWithBothNumbers) {
   options_.store.capacity = rows() - 1;
   const absl::Status status = StartError();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
@@ -220,97 +220,97 @@ TEST_F(SeedImportTest, ASeedLargerThanTheCapacityIsRefusedWithBothNumbers) {
                                        HasSubstr(absl::StrCat("room for ", rows() - 1)), HasSubstr(path_)));
 }
 
-TEST_F(SeedImportTest, ASeedThatFillsTheBufferMustLeaveRoomForActors) {
+TEST_F(SeedBufferImportTest, ASeedThatFillsTheBufferMustLeaveRoomForActors) {
   options_.store.capacity = rows();
   EXPECT_THAT(StartError().ToString(),
-              AllOf(HasSubstr(absl::StrCat("all ", rows(), " places")), HasSubstr("replay.seed.evict")));
-  options_.seed.evict = true;
+              AllOf(HasSubstr(absl::StrCat("all ", rows(), " places")), HasSubstr("replay.seed_buffer.evict")));
+  options_.seed_buffer.evict = true;
   Start();
-  options_.seed.evict = false;
-  options_.seed.others_will_come = false;
+  options_.seed_buffer.evict = false;
+  options_.seed_buffer.others_will_come = false;
   options_.store.resume = false;
   options_.store.path += ".2";
   Start();
   EXPECT_EQ(Stats().total(), rows());
 }
 
-TEST_F(SeedImportTest, ASeedTooSmallForTheFirstDrawIsRefusedWhereItIsAlone) {
-  options_.seed.min_rows = rows() + 1;
+TEST_F(SeedBufferImportTest, ASeedTooSmallForTheFirstDrawIsRefusedWhereItIsAlone) {
+  options_.seed_buffer.min_rows = rows() + 1;
   EXPECT_THAT(StartError().ToString(),
               AllOf(HasSubstr(absl::StrCat("at least ", rows() + 1)), HasSubstr("replay.min_size"),
                     HasSubstr(absl::StrCat("found ", rows()))));
-  options_.seed.min_rows = rows();
+  options_.seed_buffer.min_rows = rows();
   Start();
 }
 
-TEST_F(SeedImportTest, AnotherRobotsSeedIsRefused) {
+TEST_F(SeedBufferImportTest, AnotherRobotsSeedIsRefused) {
   options_.store.layout.observation_width = 15;
   const absl::Status status = StartError();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(status.ToString(), AllOf(HasSubstr("expected observations of 15"), HasSubstr("found 3")));
 }
 
-TEST_F(SeedImportTest, ASeedForDiscreteActionsIsRefused) {
+TEST_F(SeedBufferImportTest, ASeedForDiscreteActionsIsRefused) {
   options_.store.layout = kSmallLayout;
   EXPECT_THAT(StartError().ToString(), HasSubstr("continuous actions"));
 }
 
-TEST_F(SeedImportTest, TheLayoutIsNamedAndNeverGuessed) {
+TEST_F(SeedBufferImportTest, TheLayoutIsNamedAndNeverGuessed) {
   WriteRaw(path_, D4rlColumns(episodes_), {});
   EXPECT_THAT(StartError().ToString(), HasSubstr("expected a named layout"));
-  options_.seed.layout = "d4lr";
+  options_.seed_buffer.layout = "d4lr";
   EXPECT_THAT(StartError().ToString(), AllOf(HasSubstr("d4rl_pybullet"), HasSubstr("d4lr")));
-  options_.seed.layout = "d4rl";
+  options_.seed_buffer.layout = "d4rl";
   Start();
   EXPECT_EQ(Stats().total(), rows());
 }
 
-TEST_F(SeedImportTest, BadRowsAreRefusedOrCountedAndLeftOut) {
+TEST_F(SeedBufferImportTest, BadRowsAreRefusedOrCountedAndLeftOut) {
   std::vector<TestEpisode> episodes = episodes_;
   episodes[2].rewards[0] = std::numeric_limits<float>::quiet_NaN();
   WriteWithWriter(path_, episodes, DatasetLayout::kD4rl);
   EXPECT_THAT(StartError().ToString(),
               AllOf(HasSubstr("NaN or infinity in 1 of"), HasSubstr("--skip-bad-rows")));
-  options_.seed.skip_bad_rows = true;
+  options_.seed_buffer.skip_bad_rows = true;
   Start();
   EXPECT_EQ(Stats().total(), rows() - 1);
-  EXPECT_EQ(Stats().seed_bad_rows(), 1u);
-  EXPECT_TRUE(std::isfinite(Stats().seed_return_mean()));
+  EXPECT_EQ(Stats().seed_buffer_bad_rows(), 1u);
+  EXPECT_TRUE(std::isfinite(Stats().seed_buffer_return_mean()));
 }
 
-TEST_F(SeedImportTest, AMissingFileIsSaid) {
-  options_.seed.path = absl::StrCat(folder_.path(), "/none.hdf5");
+TEST_F(SeedBufferImportTest, AMissingFileIsSaid) {
+  options_.seed_buffer.path = absl::StrCat(folder_.path(), "/none.hdf5");
   const absl::Status status = StartError();
   EXPECT_EQ(status.code(), absl::StatusCode::kNotFound);
-  EXPECT_THAT(status.ToString(), HasSubstr(options_.seed.path));
+  EXPECT_THAT(status.ToString(), HasSubstr(options_.seed_buffer.path));
 }
 
 TEST(ReplayServerOptionsTest, TakesTheSeedFromTheConfig) {
   Config config;
   config.mutable_env()->set_name("hopper");
   config.mutable_algorithm()->set_discount(0.5);
-  SeedConfig* seed = config.mutable_replay()->mutable_seed();
-  seed->set_path("some.hdf5");
-  seed->set_layout("minari");
-  seed->set_share(0.25);
-  seed->set_evict(true);
-  seed->set_skip_bad_rows(true);
+  SeedBufferConfig* seed_buffer = config.mutable_replay()->mutable_seed_buffer();
+  seed_buffer->set_path("some.hdf5");
+  seed_buffer->set_layout("minari");
+  seed_buffer->set_share(0.25);
+  seed_buffer->set_evict(true);
+  seed_buffer->set_skip_bad_rows(true);
   ReplayServerOptions options = OptionsFrom(config, kLayout);
-  EXPECT_EQ(options.seed.path, "some.hdf5");
-  EXPECT_EQ(options.seed.layout, "minari");
-  EXPECT_EQ(options.seed.env, "hopper");
-  EXPECT_EQ(options.seed.discount, 0.5f);
-  EXPECT_TRUE(options.seed.evict);
-  EXPECT_TRUE(options.seed.skip_bad_rows);
-  EXPECT_TRUE(options.seed.others_will_come);
-  EXPECT_EQ(options.buffer.seed_share, 0.25);
-  EXPECT_EQ(options.seed.min_rows, 0u);
+  EXPECT_EQ(options.seed_buffer.path, "some.hdf5");
+  EXPECT_EQ(options.seed_buffer.layout, "minari");
+  EXPECT_EQ(options.seed_buffer.env, "hopper");
+  EXPECT_EQ(options.seed_buffer.discount, 0.5f);
+  EXPECT_TRUE(options.seed_buffer.evict);
+  EXPECT_TRUE(options.seed_buffer.skip_bad_rows);
+  EXPECT_TRUE(options.seed_buffer.others_will_come);
+  EXPECT_EQ(options.buffer.seed_buffer_share, 0.25);
+  EXPECT_EQ(options.seed_buffer.min_rows, 0u);
   config.mutable_learner()->set_offline_updates(100);
-  EXPECT_EQ(OptionsFrom(config, kLayout).seed.min_rows, 1000u);
+  EXPECT_EQ(OptionsFrom(config, kLayout).seed_buffer.min_rows, 1000u);
   config.mutable_learner()->set_max_updates(100);
-  EXPECT_FALSE(OptionsFrom(config, kLayout).seed.others_will_come);
+  EXPECT_FALSE(OptionsFrom(config, kLayout).seed_buffer.others_will_come);
   config.mutable_learner()->set_max_updates(101);
-  EXPECT_TRUE(OptionsFrom(config, kLayout).seed.others_will_come);
+  EXPECT_TRUE(OptionsFrom(config, kLayout).seed_buffer.others_will_come);
 }
 
 }  // namespace

@@ -20,57 +20,57 @@ using ::testing::Ge;
 using ::testing::HasSubstr;
 using ::testing::Le;
 
-class SeededBuffer : public Buffer {
+class BufferWithSeedBuffer : public Buffer {
  protected:
-  SeededBuffer() { store_options_.capacity = 100; }
+  BufferWithSeedBuffer() { store_options_.capacity = 100; }
 
-  // Transitions first ... first + count - 1 as the seed's.
-  absl::Status InsertSeed(std::uint64_t first, int count) {
+  // Transitions first ... first + count - 1 as the seed buffer's.
+  absl::Status InsertSeedBuffer(std::uint64_t first, int count) {
     const Rows rows(kSmallLayout, first, count);
     std::vector<float> flat;
     for (int i = 0; i < count; ++i) rows.AppendFlat(i, &flat);
-    return buffer_->InsertSeed(flat);
+    return buffer_->InsertSeedBuffer(flat);
   }
   void MakeSeeded(int rows, bool pin = true) {
     Make();
-    ASSERT_TRUE(InsertSeed(1, rows).ok());
-    ASSERT_TRUE(buffer_->CompleteSeed({.episodes = 4, .return_mean = 12.5}, pin).ok());
+    ASSERT_TRUE(InsertSeedBuffer(1, rows).ok());
+    ASSERT_TRUE(buffer_->CompleteSeedBuffer({.episodes = 4, .return_mean = 12.5}, pin).ok());
   }
-  // How many of the first `count` rows drawn from D are the seed's, whose transitions are 1 to `rows`.
-  std::int64_t SeedAmong(std::size_t count, float rows) const {
+  // How many of the first `count` rows drawn from D are the seed buffer's, whose transitions are 1 to `rows`.
+  std::int64_t SeedBufferAmong(std::size_t count, float rows) const {
     return std::count_if(uniform_.rewards.begin(),
                          uniform_.rewards.begin() + static_cast<std::ptrdiff_t>(count),
                          [rows](float reward) { return reward <= rows; });
   }
 };
 
-TEST_F(SeededBuffer, TakesWholeRowsNotYetJudged) {
+TEST_F(BufferWithSeedBuffer, TakesWholeRowsNotYetJudged) {
   store_options_.capacity = 10000;
   MakeSeeded(9000);  // more than one lock's
   const BufferStats stats = buffer_->Stats();
   EXPECT_EQ(stats.total, 9000u);
   EXPECT_EQ(stats.unjudged, 9000u);
-  EXPECT_EQ(stats.seed, 9000u);
-  EXPECT_EQ(stats.seed_rows, 9000u);
+  EXPECT_EQ(stats.seed_buffer, 9000u);
+  EXPECT_EQ(stats.seed_buffer_rows, 9000u);
   EXPECT_EQ(stats.inserted, 0u);
   EXPECT_EQ(stats.counters.episodes, 0u);
-  EXPECT_EQ(stats.seed_record.rows, 9000u);
-  EXPECT_EQ(stats.seed_record.episodes, 4u);
-  EXPECT_EQ(stats.seed_record.return_mean, 12.5);
+  EXPECT_EQ(stats.seed_buffer_record.rows, 9000u);
+  EXPECT_EQ(stats.seed_buffer_record.episodes, 4u);
+  EXPECT_EQ(stats.seed_buffer_record.return_mean, 12.5);
   ASSERT_EQ(stats.writers.size(), 2u);  // actor-0 came first
-  EXPECT_EQ(stats.writers[1].identity.source, Source::kSeed);
+  EXPECT_EQ(stats.writers[1].identity.source, Source::kSeedBuffer);
   EXPECT_EQ(stats.writers[1].held, 9000u);
   EXPECT_FALSE(stats.writers[1].connected);
   ASSERT_TRUE(Draw(1000, 0, 0).ok());
   uniform_.ExpectWhole(1000);
 }
 
-TEST_F(SeededBuffer, OnlineRowsNeverDriveAPinnedSeedOut) {
+TEST_F(BufferWithSeedBuffer, OnlineRowsNeverDriveAPinnedSeedOut) {
   MakeSeeded(60);
   ASSERT_TRUE(Insert(1001, 500, 1).ok());
   const BufferStats stats = buffer_->Stats();
   EXPECT_EQ(stats.total, 100u);
-  EXPECT_EQ(stats.seed, 60u);
+  EXPECT_EQ(stats.seed_buffer, 60u);
   EXPECT_EQ(stats.inserted, 500u);
   EXPECT_EQ(stats.evicted, 460u);
   ASSERT_TRUE(Draw(1000, 1000, 0).ok());
@@ -79,55 +79,55 @@ TEST_F(SeededBuffer, OnlineRowsNeverDriveAPinnedSeedOut) {
   EXPECT_THAT(plus_.rewards, Each(AllOf(Ge(1461), Le(1500))));
 }
 
-TEST_F(SeededBuffer, ASeedThatIsNotPinnedGoesFirst) {
+TEST_F(BufferWithSeedBuffer, ASeedThatIsNotPinnedGoesFirst) {
   MakeSeeded(60, /*pin=*/false);
   ASSERT_TRUE(Insert(1001, 70, 1).ok());
-  EXPECT_EQ(buffer_->Stats().seed, 30u);
+  EXPECT_EQ(buffer_->Stats().seed_buffer, 30u);
   ASSERT_TRUE(Draw(1000, 0, 0).ok());
   EXPECT_THAT(uniform_.rewards, Each(Ge(31)));
   ASSERT_TRUE(Insert(1071, 70, 1).ok());
-  EXPECT_EQ(buffer_->Stats().seed, 0u);
-  EXPECT_EQ(buffer_->Stats().seed_rows, 60u);
+  EXPECT_EQ(buffer_->Stats().seed_buffer, 0u);
+  EXPECT_EQ(buffer_->Stats().seed_buffer_rows, 60u);
   EXPECT_EQ(buffer_->Stats().inserted, 140u);
 }
 
-TEST_F(SeededBuffer, PartitionsHoldBothKinds) {
+TEST_F(BufferWithSeedBuffer, PartitionsHoldBothKinds) {
   MakeSeeded(10);
   ASSERT_TRUE(Insert(1001, 10, 1).ok());
   Relabel(1, {1, 2, 3, 11}, {1, 1, -1, -1});  // keys 11 to 20 are the others
   const BufferStats stats = buffer_->Stats();
   EXPECT_EQ(stats.plus, 11u);
-  EXPECT_EQ(stats.seed_plus, 2u);
+  EXPECT_EQ(stats.seed_buffer_plus, 2u);
   EXPECT_EQ(stats.minus, 2u);
-  EXPECT_EQ(stats.seed_minus, 1u);
+  EXPECT_EQ(stats.seed_buffer_minus, 1u);
   EXPECT_EQ(stats.unjudged, 7u);
 }
 
-TEST_F(SeededBuffer, TheShareOfSeedInADrawIsASetting) {
-  buffer_options_.seed_share = 0.25;
+TEST_F(BufferWithSeedBuffer, TheShareOfSeedInADrawIsASetting) {
+  buffer_options_.seed_buffer_share = 0.25;
   MakeSeeded(60);
   ASSERT_TRUE(Draw(1000, 0, 0).ok());
-  EXPECT_EQ(SeedAmong(1000, 60), 1000) << "there is nothing else yet";
+  EXPECT_EQ(SeedBufferAmong(1000, 60), 1000) << "there is nothing else yet";
   ASSERT_TRUE(Insert(1001, 5, 1).ok());
   ASSERT_TRUE(Draw(1000, 0, 0).ok());
-  EXPECT_EQ(SeedAmong(1000, 60), 250);
+  EXPECT_EQ(SeedBufferAmong(1000, 60), 250);
   uniform_.ExpectWhole(1000);
-  int drawn = 0, of_seed = 0;  // of draws too small for a whole row of the seed, by chance
+  int drawn = 0, of_seed_buffer = 0;  // of draws too small for a whole row of the seed buffer, by chance
   for (; drawn < 1000; ++drawn) {
     ASSERT_TRUE(Draw(1, 0, 0).ok());
-    of_seed += static_cast<int>(SeedAmong(1, 60));
+    of_seed_buffer += static_cast<int>(SeedBufferAmong(1, 60));
   }
-  EXPECT_NEAR(of_seed, 250, 70);
+  EXPECT_NEAR(of_seed_buffer, 250, 70);
 }
 
-TEST_F(SeededBuffer, WithoutASettingTheShareIsThatOfTheSizes) {
+TEST_F(BufferWithSeedBuffer, WithoutASettingTheShareIsThatOfTheSizes) {
   MakeSeeded(60);
   ASSERT_TRUE(Insert(1001, 20, 1).ok());
   ASSERT_TRUE(Draw(1000, 0, 0).ok());
-  EXPECT_NEAR(static_cast<double>(SeedAmong(1000, 60)), 750, 70);
+  EXPECT_NEAR(static_cast<double>(SeedBufferAmong(1000, 60)), 750, 70);
 }
 
-TEST_F(SeededBuffer, TheLimiterIsIdleUntilTheFirstOnlineRow) {
+TEST_F(BufferWithSeedBuffer, TheLimiterIsIdleUntilTheFirstOnlineRow) {
   buffer_options_.limiter = {.samples_per_insert = 2, .tolerance = 20, .min_size = 50};
   MakeSeeded(60);
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(Draw(40, 0, 0).ok());
@@ -136,7 +136,7 @@ TEST_F(SeededBuffer, TheLimiterIsIdleUntilTheFirstOnlineRow) {
   ASSERT_TRUE(Insert(1001, 1).ok());
   ASSERT_TRUE(Draw(22, 0, 0).ok());  // 2 * 1 + 20
   EXPECT_THAT(Draw(1, 0, 0).ToString(),
-              AllOf(HasSubstr("inserted 1"), HasSubstr("sampled 22"), HasSubstr("seed 60")));
+              AllOf(HasSubstr("inserted 1"), HasSubstr("sampled 22"), HasSubstr("seed buffer 60")));
   ASSERT_TRUE(Insert(1002, 21).ok());
   EXPECT_EQ(Insert(1023, 100).code(), absl::StatusCode::kDeadlineExceeded);  // 2 * 22 - 22 is above 20
   const BufferStats stats = buffer_->Stats();
@@ -144,40 +144,40 @@ TEST_F(SeededBuffer, TheLimiterIsIdleUntilTheFirstOnlineRow) {
   EXPECT_DOUBLE_EQ(stats.samples_per_insert, 1);
 }
 
-TEST_F(SeededBuffer, DrawsWaitForTheMinimumSizeOfAllRows) {
+TEST_F(BufferWithSeedBuffer, DrawsWaitForTheMinimumSizeOfAllRows) {
   buffer_options_.limiter.min_size = 50;
   Make();
-  ASSERT_TRUE(InsertSeed(1, 40).ok());
-  ASSERT_TRUE(buffer_->CompleteSeed({}, true).ok());
+  ASSERT_TRUE(InsertSeedBuffer(1, 40).ok());
+  ASSERT_TRUE(buffer_->CompleteSeedBuffer({}, true).ok());
   EXPECT_THAT(Draw(1, 0, 0).ToString(), HasSubstr("10 more transitions"));
   ASSERT_TRUE(Insert(1001, 10).ok());
   EXPECT_TRUE(Draw(1, 0, 0).ok());
 }
 
-TEST_F(SeededBuffer, ASeedComesFirstOrNotAtAll) {
+TEST_F(BufferWithSeedBuffer, ASeedComesFirstOrNotAtAll) {
   Make();
   ASSERT_TRUE(Insert(1, 3).ok());
-  EXPECT_THAT(InsertSeed(1, 1).ToString(), AllOf(HasSubstr("3 others"), HasSubstr("start a new run")));
+  EXPECT_THAT(InsertSeedBuffer(1, 1).ToString(), AllOf(HasSubstr("3 others"), HasSubstr("start a new run")));
   MakeSeeded(5);
-  EXPECT_EQ(InsertSeed(6, 1).code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_EQ(buffer_->CompleteSeed({}, true).code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_EQ(buffer_->Stats().seed_rows, 5u);
+  EXPECT_EQ(InsertSeedBuffer(6, 1).code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(buffer_->CompleteSeedBuffer({}, true).code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(buffer_->Stats().seed_buffer_rows, 5u);
 }
 
-TEST_F(SeededBuffer, ASeedThatHasEveryPlaceLeavesNoneForOthers) {
+TEST_F(BufferWithSeedBuffer, ASeedThatHasEveryPlaceLeavesNoneForOthers) {
   Make();
-  EXPECT_THAT(InsertSeed(1, 101).ToString(), AllOf(HasSubstr("100"), HasSubstr("replay.capacity")));
+  EXPECT_THAT(InsertSeedBuffer(1, 101).ToString(), AllOf(HasSubstr("100"), HasSubstr("replay.capacity")));
   MakeSeeded(100);
   const absl::Status status = Insert(1001, 1);
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_THAT(status.ToString(), AllOf(HasSubstr("seed of 100"), HasSubstr("replay.seed.evict")));
+  EXPECT_THAT(status.ToString(), AllOf(HasSubstr("seed buffer of 100"), HasSubstr("replay.seed_buffer.evict")));
   EXPECT_EQ(Relabel(1, {1, 100, 101}, {1, 1, 1}).evicted, 1u);
   EXPECT_TRUE(Draw(10, 10, 0).ok());
 }
 
-class StoredSeed : public SeededBuffer {
+class StoredSeedBuffer : public BufferWithSeedBuffer {
  protected:
-  StoredSeed() { store_options_.path = absl::StrCat(folder_.path(), "/replay.store"); }
+  StoredSeedBuffer() { store_options_.path = absl::StrCat(folder_.path(), "/replay.store"); }
   void Reopen() {
     buffer_.reset();
     store_options_.resume = true;
@@ -186,7 +186,7 @@ class StoredSeed : public SeededBuffer {
   TestFolder folder_;
 };
 
-TEST_F(StoredSeed, StaysPinnedOverARestart) {
+TEST_F(StoredSeedBuffer, StaysPinnedOverARestart) {
   MakeSeeded(60);
   ASSERT_TRUE(Draw(1000, 0, 0).ok());
   ASSERT_TRUE(Insert(1001, 130, 1).ok());
@@ -194,35 +194,35 @@ TEST_F(StoredSeed, StaysPinnedOverARestart) {
   Reopen();
   BufferStats stats = buffer_->Stats();
   EXPECT_EQ(stats.total, 100u);
-  EXPECT_EQ(stats.seed, 60u);
-  EXPECT_EQ(stats.seed_minus, 1u);
+  EXPECT_EQ(stats.seed_buffer, 60u);
+  EXPECT_EQ(stats.seed_buffer_minus, 1u);
   EXPECT_EQ(stats.plus, 40u);
   EXPECT_EQ(stats.inserted, 130u);
-  EXPECT_EQ(stats.seed_record.return_mean, 12.5);
+  EXPECT_EQ(stats.seed_buffer_record.return_mean, 12.5);
   EXPECT_EQ(stats.counters.sampled_offline, 1000u);
-  EXPECT_EQ(InsertSeed(61, 1).code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(InsertSeedBuffer(61, 1).code(), absl::StatusCode::kFailedPrecondition);
   ASSERT_TRUE(Insert(1131, 30, 1).ok());
   ASSERT_TRUE(Draw(1000, 1000, 0).ok());
   uniform_.ExpectWhole(1000);
   EXPECT_THAT(plus_.rewards, Each(AllOf(Ge(1121), Le(1160))));
-  EXPECT_EQ(buffer_->Stats().seed, 60u);
+  EXPECT_EQ(buffer_->Stats().seed_buffer, 60u);
 }
 
-TEST_F(StoredSeed, GoesOnWhereItWasBrokenOff) {
+TEST_F(StoredSeedBuffer, GoesOnWhereItWasBrokenOff) {
   Make();
-  ASSERT_TRUE(InsertSeed(1, 30).ok());
+  ASSERT_TRUE(InsertSeedBuffer(1, 30).ok());
   Reopen();
-  EXPECT_EQ(buffer_->Stats().seed_rows, 30u);
-  EXPECT_EQ(buffer_->Stats().seed_record.complete, 0u);
-  ASSERT_TRUE(InsertSeed(31, 30).ok());
-  ASSERT_TRUE(buffer_->CompleteSeed({}, true).ok());
+  EXPECT_EQ(buffer_->Stats().seed_buffer_rows, 30u);
+  EXPECT_EQ(buffer_->Stats().seed_buffer_record.complete, 0u);
+  ASSERT_TRUE(InsertSeedBuffer(31, 30).ok());
+  ASSERT_TRUE(buffer_->CompleteSeedBuffer({}, true).ok());
   ASSERT_TRUE(Insert(1001, 200, 1).ok());
-  EXPECT_EQ(buffer_->Stats().seed, 60u);
+  EXPECT_EQ(buffer_->Stats().seed_buffer, 60u);
   ASSERT_TRUE(Draw(1000, 0, 0).ok());
   EXPECT_THAT(uniform_.rewards, Each(::testing::AnyOf(Le(60), Ge(1161))));
 }
 
-TEST_F(StoredSeed, ADamagedRowOfAPinnedSeedIsSaid) {
+TEST_F(StoredSeedBuffer, ADamagedRowOfAPinnedSeedIsSaid) {
   MakeSeeded(60);
   buffer_.reset();
   const std::string contents = *ReadFile(store_options_.path);
@@ -236,7 +236,7 @@ TEST_F(StoredSeed, ADamagedRowOfAPinnedSeedIsSaid) {
   store_options_.resume = true;
   const absl::Status status = TransitionStore::Open(store_options_).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
-  EXPECT_THAT(status.ToString(), HasSubstr("row 33 of its seed is damaged"));
+  EXPECT_THAT(status.ToString(), HasSubstr("row 33 of its seed buffer is damaged"));
 }
 
 }  // namespace

@@ -25,9 +25,9 @@ namespace dbr {
 // policy's from before step 2's, so that nothing is computed twice; the temperature is the exponential of
 // what Adam moves.
 template <class Scalar>
-class SacDiscrete : public ActorCriticAlgorithm<SoftNetworks<Scalar>> {
+class DiscreteSac : public ActorCriticAlgorithm<SoftNetworks<Scalar>> {
  public:
-  explicit SacDiscrete(const AlgorithmSpec& spec);
+  explicit DiscreteSac(const AlgorithmSpec& spec);
 
   // `plus` and `minus` are not used.
   absl::Status Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>& plus,
@@ -48,6 +48,6 @@ class SacDiscrete : public ActorCriticAlgorithm<SoftNetworks<Scalar>> {
   MatrixX<Scalar> d_logits_;                               // [actions x n]
 };
 
-std::unique_ptr<Algorithm> MakeSacDiscrete(const AlgorithmSpec& spec);
+std::unique_ptr<Algorithm> MakeDiscreteSac(const AlgorithmSpec& spec);
 
 }  // namespace dbr

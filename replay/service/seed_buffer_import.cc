@@ -1,4 +1,4 @@
-#include "replay/service/seed_import.h"
+#include "replay/service/seed_buffer_import.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -14,43 +14,43 @@
 namespace dbr {
 namespace {
 
-absl::Status CheckEnough(const SeedOptions& options, std::uint64_t transitions) {
+absl::Status CheckEnough(const SeedBufferOptions& options, std::uint64_t transitions) {
   if (transitions > 0 && transitions >= options.min_rows) return absl::OkStatus();
   return absl::InvalidArgumentError(
-      absl::StrCat("replay.seed.path: expected at least ", std::max<std::uint64_t>(1, options.min_rows),
+      absl::StrCat("replay.seed_buffer.path: expected at least ", std::max<std::uint64_t>(1, options.min_rows),
                    " transitions (replay.min_size, before which nothing is drawn), found ", transitions,
                    " in ", options.path, ". Lower replay.min_size or take a larger seed."));
 }
 
-absl::Status CheckRoom(const SeedOptions& options, std::uint64_t transitions, std::uint64_t capacity) {
+absl::Status CheckRoom(const SeedBufferOptions& options, std::uint64_t transitions, std::uint64_t capacity) {
   if (transitions > capacity) {
-    return absl::InvalidArgumentError(absl::StrCat("replay.seed.path: the seed ", options.path, " has ",
+    return absl::InvalidArgumentError(absl::StrCat("replay.seed_buffer.path: the seed buffer ", options.path, " has ",
                                                    transitions, " transitions, the buffer has room for ",
                                                    capacity, ". Raise replay.capacity to more than ",
                                                    transitions, "."));
   }
   if (transitions == capacity && options.others_will_come && !options.evict) {
     return absl::InvalidArgumentError(absl::StrCat(
-        "replay.seed.path: the seed ", options.path, " fills all ", capacity,
+        "replay.seed_buffer.path: the seed buffer ", options.path, " fills all ", capacity,
         " places of the buffer and is never evicted, so that there is none for what the actors do. Raise "
-        "replay.capacity, or set replay.seed.evict: true."));
+        "replay.capacity, or set replay.seed_buffer.evict: true."));
   }
   return CheckEnough(options, transitions);
 }
 
 // A reader of the file, whose transitions fit.
-absl::StatusOr<std::unique_ptr<DatasetReader>> OpenFitting(const SeedOptions& options,
+absl::StatusOr<std::unique_ptr<DatasetReader>> OpenFitting(const SeedBufferOptions& options,
                                                            const TransitionLayout& layout,
                                                            std::uint64_t capacity) {
   if (layout.mask_width > 0) {
     return absl::InvalidArgumentError(
-        absl::StrCat("replay.seed.path: expected an environment with continuous actions, "
+        absl::StrCat("replay.seed_buffer.path: expected an environment with continuous actions, "
                      "for offline data has none other, found ",
                      options.env));
   }
   if (layout.return_width > 0 && options.discount >= 1) {
     return absl::InvalidArgumentError(
-        absl::StrCat("algorithm.discount: expected below 1 where the returns of a seed are needed (advantage "
+        absl::StrCat("algorithm.discount: expected below 1 where the returns of a seed buffer are needed (advantage "
                      "SIL), for those of "
                      "episodes that were cut have no bound else, found ",
                      options.discount));
@@ -69,7 +69,7 @@ absl::StatusOr<std::unique_ptr<DatasetReader>> OpenFitting(const SeedOptions& op
   return reader;
 }
 
-SeedRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
+SeedBufferRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
   return {.bad_rows = static_cast<std::uint64_t>(facts.non_finite),
           .episodes = static_cast<std::uint64_t>(facts.episodes),
           .return_mean = facts.return_mean,
@@ -80,14 +80,14 @@ SeedRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
 }
 
 // The file's rows, flat as the buffer lays them, with returns where it wants them.
-class SeedRows {
+class SeedBufferRows {
  public:
   // `reader` outlives this.
-  SeedRows(DatasetReader* reader, const TransitionLayout& layout, float discount) : reader_(reader) {
+  SeedBufferRows(DatasetReader* reader, const TransitionLayout& layout, float discount) : reader_(reader) {
     if (layout.return_width > 0) {
       returns_.emplace(reader, discount);
     } else {
-      chunk_.emplace(layout, PartitionedBuffer::kSeedRowsPerLock);
+      chunk_.emplace(layout, PartitionedBuffer::kSeedBufferRowsPerLock);
     }
   }
 
@@ -106,31 +106,31 @@ class SeedRows {
 
 }  // namespace
 
-absl::Status CheckSeedFits(const SeedOptions& options, const TransitionLayout& layout,
+absl::Status CheckSeedBufferFits(const SeedBufferOptions& options, const TransitionLayout& layout,
                            std::uint64_t capacity) {
   return OpenFitting(options, layout, capacity).status();
 }
 
-absl::StatusOr<SeedRecord> ImportSeed(const SeedOptions& options, PartitionedBuffer* buffer) {
+absl::StatusOr<SeedBufferRecord> ImportSeedBuffer(const SeedBufferOptions& options, PartitionedBuffer* buffer) {
   const BufferStats before = buffer->Stats();
-  if (before.seed_record.complete != 0) return before.seed_record;
+  if (before.seed_buffer_record.complete != 0) return before.seed_buffer_record;
   const absl::Time start = absl::Now();
   const TransitionLayout& layout = buffer->layout();
   ASSIGN_OR_RETURN(const std::unique_ptr<DatasetReader> reader,
                    OpenFitting(options, layout, buffer->capacity()));
-  SeedRows seed(reader.get(), layout, options.discount);
-  std::uint64_t held_already = before.seed_rows * static_cast<std::uint64_t>(layout.stride());  // floats
+  SeedBufferRows seed_buffer(reader.get(), layout, options.discount);
+  std::uint64_t held_already = before.seed_buffer_rows * static_cast<std::uint64_t>(layout.stride());  // floats
   for (;;) {
-    ASSIGN_OR_RETURN(const absl::Span<const float> rows, seed.Next());
+    ASSIGN_OR_RETURN(const absl::Span<const float> rows, seed_buffer.Next());
     if (rows.empty()) break;
     const std::uint64_t skipped = std::min(held_already, static_cast<std::uint64_t>(rows.size()));
     held_already -= skipped;
-    RETURN_IF_ERROR(buffer->InsertSeed(rows.subspan(skipped)));
+    RETURN_IF_ERROR(buffer->InsertSeedBuffer(rows.subspan(skipped)));
   }
   // Bad rows may have been left out.
   RETURN_IF_ERROR(CheckEnough(options, static_cast<std::uint64_t>(reader->facts().transitions)));
-  RETURN_IF_ERROR(buffer->CompleteSeed(RecordOf(reader->facts(), absl::Now() - start), !options.evict));
-  return buffer->Stats().seed_record;
+  RETURN_IF_ERROR(buffer->CompleteSeedBuffer(RecordOf(reader->facts(), absl::Now() - start), !options.evict));
+  return buffer->Stats().seed_buffer_record;
 }
 
 }  // namespace dbr
