@@ -14,8 +14,6 @@
 #include "core/status_macros.h"
 #include "envs/registry/registry.h"
 #include "proto/config/config_file.h"
-#include "proto/rpc/channel.h"
-#include "proto/rpc/grpc_status.h"
 #include "replay/client/await_stats.h"
 #include "replay/client/client.h"
 
@@ -193,7 +191,7 @@ absl::StatusOr<std::unique_ptr<EvaluatorProcess>> EvaluatorProcess::Create(const
 
 EvaluatorProcess::EvaluatorProcess(const ActorOptions& options, const EnvSpec& env)
     : best_policy_(options.best_policy),
-      stub_(Policy::NewStub(MakeChannel(options.learner_address))),
+      learner_(options.learner_address),
       subscriber_(
           Subscription(options, env, "evaluator", Rng(options.config.seed()).Fork(kEvaluatorStream)())),
       loop_(
@@ -222,10 +220,7 @@ void EvaluatorProcess::KeepBest(const PolicySnapshot& snapshot) const {
 }
 
 absl::Status EvaluatorProcess::Report(const EvaluationReport& report) {
-  grpc::ClientContext context;
-  SetDeadline(kReportTimeout, &context);
-  EvaluationReportReply reply;
-  return FromGrpc(stub_->ReportEvaluation(&context, report, &reply));
+  return learner_.ReportEvaluation(report, kReportTimeout);
 }
 
 }  // namespace dbr

@@ -14,7 +14,8 @@
 #include "actor/step_loop.h"
 #include "envs/env.h"
 #include "proto/config.pb.h"
-#include "proto/policy.grpc.pb.h"
+#include "proto/policy.pb.h"
+#include "proto/rpc/learner_client.h"
 #include "replay/client/writer.h"
 
 namespace dbr {
@@ -79,7 +80,7 @@ class EvaluatorProcess {
   void KeepBest(const PolicySnapshot& snapshot) const;
 
   const std::string best_policy_;
-  const std::unique_ptr<Policy::Stub> stub_;
+  LearnerClient learner_;
   PolicySubscriber subscriber_;
   EvaluationLoop loop_;
 };

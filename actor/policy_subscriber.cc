@@ -1,5 +1,6 @@
 #include "actor/policy_subscriber.h"
 
+#include <grpcpp/grpcpp.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/status_macros.h"
 #include "proto/config/config_file.h"
+#include "proto/policy.grpc.pb.h"
 #include "proto/rpc/channel.h"
 #include "proto/rpc/codec.h"
 #include "proto/rpc/grpc_status.h"
@@ -29,9 +31,15 @@ PolicySpec ExpectedPolicy(const EnvSpec& env, const Config& config) {
           .hidden_sizes = HiddenSizes(config)};
 }
 
+struct PolicySubscriber::Stub {
+  explicit Stub(const std::string& address) : generated(Policy::NewStub(MakeChannel(address))) {}
+
+  const std::unique_ptr<Policy::Stub> generated;
+};
+
 PolicySubscriber::PolicySubscriber(SubscriberOptions options)
     : options_(std::move(options)),
-      stub_(Policy::NewStub(MakeChannel(options_.address))),
+      stub_(std::make_unique<Stub>(options_.address)),
       rng_(options_.seed) {
   thread_ = std::thread(&PolicySubscriber::Run, this);
 }
@@ -103,7 +111,7 @@ absl::Status PolicySubscriber::Subscribe() {
     // has.
     request.set_have_version(current_ != nullptr && !said_ ? current_->snapshot().version : 0);
   }
-  const auto reader = stub_->Subscribe(&context, request);
+  const auto reader = stub_->generated->Subscribe(&context, request);
   PolicyMessage message;
   absl::Status taken;
   while (taken.ok() && reader->Read(&message)) taken = Take(message);

@@ -1,8 +1,6 @@
 // The newest policy of the learner, kept up to date in the background.
 #pragma once
 
-#include <grpcpp/grpcpp.h>
-
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -15,7 +13,11 @@
 #include "absl/time/time.h"
 #include "core/rng.h"
 #include "nn/policy.h"
-#include "proto/policy.grpc.pb.h"
+#include "proto/policy.pb.h"
+
+namespace grpc {
+class ClientContext;
+}
 
 namespace dbr {
 
@@ -56,6 +58,8 @@ class PolicySubscriber {
   void Close();  // from any thread; wakes those who wait
 
  private:
+  struct Stub;  // the generated one is costly to compile, so that no header holds it
+
   void Run();
   absl::Status Subscribe();                         // one stream, until it breaks
   absl::Status Take(const PolicyMessage& message);  // a policy from the stream
@@ -63,7 +67,7 @@ class PolicySubscriber {
   void SayReturn();
 
   const SubscriberOptions options_;
-  const std::unique_ptr<Policy::Stub> stub_;
+  const std::unique_ptr<Stub> stub_;
   Rng rng_;            // of the thread
   bool said_ = false;  // of the thread: the loss is known to the reader of the log
   int attempts_ = 0;   // of the thread: since the last policy

@@ -4,6 +4,7 @@ set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+set(CMAKE_CXX_COMPILE_OPTIONS_PIE -fPIC)  # programs are compiled as libraries are, so that both read one precompiled header
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
 
@@ -59,19 +60,16 @@ set(DBR_PCH_PLAIN <algorithm> <array> <atomic> <cmath> <cstdint> <cstring> <func
   <utility> <vector> <absl/status/status.h> <absl/status/statusor.h> <absl/strings/str_cat.h> <absl/strings/str_join.h>
   <absl/synchronization/mutex.h> <absl/time/time.h> <absl/types/span.h> <Eigen/Core>)
 set(DBR_PCH_RPC ${DBR_PCH_PLAIN} <grpcpp/grpcpp.h> <spdlog/spdlog.h>)
+set(DBR_PCH_TOOL ${DBR_PCH_RPC} <filesystem> <map> <set> <CLI/CLI.hpp> <nlohmann/json.hpp>)
 set(DBR_PCH_TEST ${DBR_PCH_PLAIN} <filesystem> <fstream> <map> <set> <sstream> <thread> <gmock/gmock.h> <gtest/gtest.h>
   <nlohmann/json.hpp>)
 
-# dbr_precompile(NAME): makes the precompiled header that targets of the kind NAME (plain, rpc or test) share.
+# dbr_precompile(NAME): makes the precompiled header that targets of the kind NAME (plain, rpc, tool or test) share.
 function(dbr_precompile kind)
-  cmake_parse_arguments(ARG "EXECUTABLE" "" "DEPS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "DEPS" ${ARGN})
   string(TOUPPER ${kind} upper)
-  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/pch/${kind}.cc CONTENT "int main() { return 0; }\n")
-  if(ARG_EXECUTABLE)  # programs are compiled with -fPIE, libraries with -fPIC; one cannot read what the other precompiled
-    add_executable(dbr_pch_${kind} EXCLUDE_FROM_ALL ${PROJECT_BINARY_DIR}/pch/${kind}.cc)
-  else()
-    add_library(dbr_pch_${kind} OBJECT EXCLUDE_FROM_ALL ${PROJECT_BINARY_DIR}/pch/${kind}.cc)
-  endif()
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/pch/${kind}.cc CONTENT "// Only its precompiled header is wanted.\n")
+  add_library(dbr_pch_${kind} OBJECT EXCLUDE_FROM_ALL ${PROJECT_BINARY_DIR}/pch/${kind}.cc)
   target_link_libraries(dbr_pch_${kind} PRIVATE dbr_flags dbr_warnings ${ARG_DEPS})
   target_precompile_headers(dbr_pch_${kind} PRIVATE ${DBR_PCH_${upper}})
 endfunction()
@@ -99,6 +97,7 @@ function(dbr_binary name)
   cmake_parse_arguments(ARG "" "" "SRCS;DEPS" ${ARGN})
   add_executable(${name} ${ARG_SRCS})
   target_link_libraries(${name} PRIVATE dbr_flags dbr_warnings ${ARG_DEPS})
+  dbr_use_precompiled(${name} tool)
 endfunction()
 
 # dbr_test(NAME SRCS a_test.cc DEPS libs... LABELS slow TIMEOUT 60): a GoogleTest program that ctest runs as one test.

@@ -97,17 +97,19 @@ std::string SourceLine(const char* name, std::uint64_t of_d, std::uint64_t of_pl
 }
 
 std::string Sources(const StatsReply& stats) {
-  std::string text =
-      absl::StrCat("\nsources\n",
-                   SourceLine("online", stats.total() - stats.seed_buffer(), stats.plus() - stats.seed_buffer_plus(),
-                              stats.minus() - stats.seed_buffer_minus(), stats),
-                   SourceLine("seed_buffer", stats.seed_buffer(), stats.seed_buffer_plus(), stats.seed_buffer_minus(), stats));
+  std::string text = absl::StrCat(
+      "\nsources\n",
+      SourceLine("online", stats.total() - stats.seed_buffer(), stats.plus() - stats.seed_buffer_plus(),
+                 stats.minus() - stats.seed_buffer_minus(), stats),
+      SourceLine("seed_buffer", stats.seed_buffer(), stats.seed_buffer_plus(), stats.seed_buffer_minus(),
+                 stats));
   if (stats.seed_buffer_rows() == 0) return text;
   absl::StrAppend(&text, "             ", WithCommas(stats.seed_buffer_rows()), " transitions came in at ",
-                  Compact(stats.seed_buffer_rows_per_second()), " rows/s, ", WithCommas(stats.seed_buffer_bad_rows()),
-                  " bad rows left out;\n             ", WithCommas(stats.seed_buffer_episodes()),
-                  " whole episodes with a return of ", Fixed(stats.seed_buffer_return_mean(), 1), " ± ",
-                  Fixed(stats.seed_buffer_return_std(), 1), " (", Fixed(stats.seed_buffer_return_min(), 1), " to ",
+                  Compact(stats.seed_buffer_rows_per_second()), " rows/s, ",
+                  WithCommas(stats.seed_buffer_bad_rows()), " bad rows left out;\n             ",
+                  WithCommas(stats.seed_buffer_episodes()), " whole episodes with a return of ",
+                  Fixed(stats.seed_buffer_return_mean(), 1), " ± ", Fixed(stats.seed_buffer_return_std(), 1),
+                  " (", Fixed(stats.seed_buffer_return_min(), 1), " to ",
                   Fixed(stats.seed_buffer_return_max(), 1), ")\n");
   return text;
 }

@@ -170,10 +170,10 @@ void Launch::TellOfTheSeedBuffer() {
   summary_.Update(monitor_->Ask(kFirstAnswerWithin));
   const SeedBufferSummary& seed_buffer = summary_.seed_buffer;
   if (seed_buffer.rows == 0) return;
-  Say(absl::StrCat("the seed buffer holds ", WithCommas(seed_buffer.rows), " transitions, ", WithCommas(seed_buffer.episodes),
-                   " whole episodes with a mean return of ", Fixed(seed_buffer.return_mean, 1), " ± ",
-                   Fixed(seed_buffer.return_std, 1), "; it was loaded at ", Compact(seed_buffer.rows_per_second),
-                   " rows/s"));
+  Say(absl::StrCat("the seed buffer holds ", WithCommas(seed_buffer.rows), " transitions, ",
+                   WithCommas(seed_buffer.episodes), " whole episodes with a mean return of ",
+                   Fixed(seed_buffer.return_mean, 1), " ± ", Fixed(seed_buffer.return_std, 1),
+                   "; it was loaded at ", Compact(seed_buffer.rows_per_second), " rows/s"));
   if (seed_buffer.bad_rows > 0)
     Say(absl::StrCat(WithCommas(seed_buffer.bad_rows), " rows with values that are not finite are left out"));
 }

@@ -1,10 +1,6 @@
 #include "deploy/launch/monitor.h"
 
-#include <grpcpp/grpcpp.h>
-
 #include <utility>
-
-#include "proto/rpc/channel.h"
 
 namespace dbr {
 namespace {
@@ -16,7 +12,7 @@ constexpr absl::Duration kCallTimeout = absl::Seconds(2);
 RunMonitor::RunMonitor(const std::string& replay_address, const std::string& learner_address,
                        absl::Duration period, std::function<void()> on_sample)
     : replay_(replay_address),
-      learner_(Policy::NewStub(MakeChannel(learner_address))),
+      learner_(learner_address),
       period_(period),
       on_sample_(std::move(on_sample)),
       thread_([this] { Run(); }) {}
@@ -37,15 +33,12 @@ RunSample RunMonitor::Latest() const {
 
 RunSample RunMonitor::Ask(absl::Duration timeout) {
   const absl::StatusOr<StatsReply> stats = replay_.Stats(timeout);
-  LearnerStatus status;
-  grpc::ClientContext context;
-  SetDeadline(timeout, &context);
-  const bool answered = learner_->Status(&context, {}, &status).ok();
+  const absl::StatusOr<LearnerStatus> status = learner_.Status(timeout);
   absl::MutexLock lock(&mutex_);
   latest_.replay_away = !stats.ok();
   if (stats.ok()) latest_.replay = *stats;
-  latest_.learner_away = !answered;
-  if (answered) latest_.learner = status;
+  latest_.learner_away = !status.ok();
+  if (status.ok()) latest_.learner = *status;
   return latest_;
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -10,8 +9,9 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
-#include "proto/policy.grpc.pb.h"
+#include "proto/policy.pb.h"
 #include "proto/replay.pb.h"
+#include "proto/rpc/learner_client.h"
 #include "replay/client/client.h"
 
 namespace dbr {
@@ -43,7 +43,7 @@ class RunMonitor {
   void Run();
 
   ReplayClient replay_;
-  const std::unique_ptr<Policy::Stub> learner_;
+  LearnerClient learner_;
   const absl::Duration period_;
   const std::function<void()> on_sample_;
   mutable absl::Mutex mutex_;

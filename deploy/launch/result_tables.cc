@@ -86,10 +86,10 @@ std::string ResultTable(absl::Span<const EvaluationResult> results) {
 std::string ReturnsTable(const RunSummary& summary) {
   if (summary.seed_buffer.rows == 0) return "";
   const SeedBufferSummary& seed_buffer = summary.seed_buffer;
-  std::string table =
-      absl::StrCat(" mean returns\n", ReturnLine("of the seed buffer", seed_buffer.return_mean,
-                                                 absl::StrCat(WithCommas(seed_buffer.rows), " transitions, ",
-                                                              WithCommas(seed_buffer.episodes), " whole episodes")));
+  std::string table = absl::StrCat(
+      " mean returns\n", ReturnLine("of the seed buffer", seed_buffer.return_mean,
+                                    absl::StrCat(WithCommas(seed_buffer.rows), " transitions, ",
+                                                 WithCommas(seed_buffer.episodes), " whole episodes")));
   if (const auto point = summary.AfterOffline())
     table += ReturnLine("after the offline phase", point->return_mean, Describe(*point));
   if (const auto point = summary.curve.LowestOnline())

@@ -48,9 +48,12 @@ Json ToJson(const std::optional<EvaluationPoint>& point) {
 Json SeedBufferJson(const SeedBufferSummary& seed_buffer) {
   Json returns = {{"mean", Number(seed_buffer.return_mean)}};
   returns.update(Spread(seed_buffer.return_std, seed_buffer.return_min, seed_buffer.return_max));
-  return {{"path", seed_buffer.path},         {"rows", seed_buffer.rows},
-          {"bad_rows", seed_buffer.bad_rows}, {"episodes", seed_buffer.episodes},
-          {"return", returns},         {"rows_per_second", Number(seed_buffer.rows_per_second)}};
+  return {{"path", seed_buffer.path},
+          {"rows", seed_buffer.rows},
+          {"bad_rows", seed_buffer.bad_rows},
+          {"episodes", seed_buffer.episodes},
+          {"return", returns},
+          {"rows_per_second", Number(seed_buffer.rows_per_second)}};
 }
 
 Json ReturnsJson(const RunSummary& summary) {

@@ -89,8 +89,9 @@ absl::Status CheckSeedBuffer(const Config& config, const EnvSpec& env) {
         "this records one:\n  dbr dataset record --env ",
         env.name, " --quality medium --steps 1000000 --out ", env.name, "-medium.hdf5"));
   }
-  return CheckSeedBufferFits(SeedBufferOptionsFrom(config), TransitionLayout::Of(env, NeedsReturns(config.algorithm())),
-                       config.replay().capacity());
+  return CheckSeedBufferFits(SeedBufferOptionsFrom(config),
+                             TransitionLayout::Of(env, NeedsReturns(config.algorithm())),
+                             config.replay().capacity());
 }
 
 // Before hours of training, at whose end alone some of them are met.

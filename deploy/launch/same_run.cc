@@ -36,7 +36,8 @@ absl::StatusOr<Config> Outcome(const Config& config) {
   ReplayConfig* replay = outcome.mutable_replay();
   replay->clear_address();
   replay->clear_allow_insecure();
-  replay->mutable_seed_buffer()->set_path(std::filesystem::path(replay->seed_buffer().path()).filename().string());
+  replay->mutable_seed_buffer()->set_path(
+      std::filesystem::path(replay->seed_buffer().path()).filename().string());
   LearnerConfig* learner = outcome.mutable_learner();
   learner->clear_address();
   learner->clear_allow_insecure();

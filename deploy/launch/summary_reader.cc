@@ -124,7 +124,8 @@ absl::StatusOr<RunSummary> LoadSummary(const RunFolder& folder) {
   summary.commit = Text(json, "commit");
   summary.failure = Text(json, "failure");
   ReadCounters(json, &summary);
-  if (const Json& seed_buffer = Part(json, "seed_buffer"); !seed_buffer.empty()) summary.seed_buffer = ReadSeedBuffer(seed_buffer);
+  if (const Json& seed_buffer = Part(json, "seed_buffer"); !seed_buffer.empty())
+    summary.seed_buffer = ReadSeedBuffer(seed_buffer);
   summary.offline_updates = Count(json, "offline_updates");
   std::vector<EvaluationPoint> points;
   for (const Json& point : Part(json, "evaluations")) {

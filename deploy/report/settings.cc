@@ -69,7 +69,8 @@ Settings SettingsOf(const Config& config) {
   Config seedless = config;
   seedless.clear_seed();
   const std::string data = seedless.replay().seed_buffer().path();
-  if (!data.empty()) seedless.mutable_replay()->mutable_seed_buffer()->set_path(data.substr(data.rfind('/') + 1));
+  if (!data.empty())
+    seedless.mutable_replay()->mutable_seed_buffer()->set_path(data.substr(data.rfind('/') + 1));
   const std::string effective = PrintConfig(seedless);
   Settings settings;
   AppendDifferences(seedless, DefaultConfig(), "", &settings.differences);

@@ -13,9 +13,9 @@
 #include "learner/algorithms/ddqn.h"
 #include "learner/algorithms/discrete_bear.h"
 #include "learner/algorithms/discrete_dbr.h"
+#include "learner/algorithms/discrete_sac.h"
 #include "learner/algorithms/normalized.h"
 #include "learner/algorithms/sac.h"
-#include "learner/algorithms/discrete_sac.h"
 #include "learner/algorithms/td3.h"
 
 namespace dbr {

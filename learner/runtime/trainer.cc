@@ -7,6 +7,7 @@
 
 #include "absl/time/clock.h"
 #include "core/status_macros.h"
+#include "learner/runtime/policy_service.h"
 #include "learner/training/tensor_state.h"
 
 namespace dbr {

@@ -12,13 +12,14 @@
 #include "core/run_folder.h"
 #include "learner/algorithm.h"
 #include "learner/metrics/metrics_sink.h"
-#include "learner/runtime/policy_service.h"
 #include "learner/runtime/prefetcher.h"
 #include "learner/runtime/relabeller.h"
 #include "learner/runtime/saver.h"
 #include "proto/config.pb.h"
 
 namespace dbr {
+
+class PolicyService;
 
 struct TrainerParts {
   std::unique_ptr<Algorithm> algorithm;

@@ -44,7 +44,8 @@ struct BufferStats {
   std::uint64_t seed_buffer_rows = 0;  // that ever came in
   SeedBufferRecord seed_buffer_record{};
   StoreCounters counters{};
-  double samples_per_insert = 0;  // over the life of the buffer; the seed buffer, and draws from it alone, apart
+  double samples_per_insert =
+      0;  // over the life of the buffer; the seed buffer, and draws from it alone, apart
   double insert_rate = 0, sample_rate = 0, relabel_rate = 0;  // a second, over the last seconds
   LabelSummary labels;  // of at most PartitionedBuffer::kLabelsLookedAt rows, evenly spread over the buffer
   std::vector<WriterSummary> writers;

@@ -24,8 +24,8 @@
 namespace dbr {
 
 // Thread-safe behind one lock, which it holds for at most kRowsPerLock inserted rows, one draw or one
-// relabel. Rows are evicted first in, first out; a seed buffer may be pinned, and then the oldest of the others
-// goes. An advantage of 0 lies in D+ and in D-.
+// relabel. Rows are evicted first in, first out; a seed buffer may be pinned, and then the oldest of the
+// others goes. An advantage of 0 lies in D+ and in D-.
 class PartitionedBuffer {
  public:
   static constexpr int kRowsPerLock = 256;
@@ -51,12 +51,12 @@ class PartitionedBuffer {
   // pinned seed buffer has every place.
   absl::Status Insert(std::uint32_t place, InsertBatch* batch, absl::Time deadline);
 
-  // Appends rows of the seed buffer, flat as the layout lays them, not yet judged. The limiter does not ask for
-  // them, nor count them. InvalidArgument where they are more than fit; FailedPrecondition once something
+  // Appends rows of the seed buffer, flat as the layout lays them, not yet judged. The limiter does not ask
+  // for them, nor count them. InvalidArgument where they are more than fit; FailedPrecondition once something
   // else has been inserted, or after CompleteSeedBuffer.
   absl::Status InsertSeedBuffer(absl::Span<const float> rows);
-  // Ends the seed buffer and writes down what is known of it (`record`, but for its counts of rows); with `pin` none
-  // of its rows is ever evicted. FailedPrecondition as InsertSeedBuffer's.
+  // Ends the seed buffer and writes down what is known of it (`record`, but for its counts of rows); with
+  // `pin` none of its rows is ever evicted. FailedPrecondition as InsertSeedBuffer's.
   absl::Status CompleteSeedBuffer(const SeedBufferRecord& record, bool pin);
 
   // Draws with replacement into `out`, all parts under one snapshot. Blocks until the limiter admits and,

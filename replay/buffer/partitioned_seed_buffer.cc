@@ -80,7 +80,8 @@ void PartitionedBuffer::ChooseSlots(int part, std::uint32_t count) {
   // The expected number of seed buffer rows is exact: what is left of a whole number is drawn by chance.
   const auto from_seed_buffer = static_cast<std::size_t>(seed_buffer_share_ * count + rng_.Uniform());
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint64_t rank = i < from_seed_buffer ? rng_.Below(seed_buffer) : seed_buffer + rng_.Below(others);
+    const std::uint64_t rank =
+        i < from_seed_buffer ? rng_.Below(seed_buffer) : seed_buffer + rng_.Below(others);
     drawn_slots_[i] = store_->SlotOf(store_->KeyAtRank(rank));
   }
 }

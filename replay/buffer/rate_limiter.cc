@@ -55,10 +55,11 @@ bool RateLimiter::MakeRoomFor(std::uint64_t n) {
 }
 
 std::string RateLimiter::Describe(const Counts& counts) const {
-  return absl::StrCat("rate limiter (samples_per_insert ", options_.samples_per_insert, ", tolerance ",
-                      options_.tolerance, ", min_size ", options_.min_size, ") with inserted ",
-                      counts.inserted, ", sampled ", counts.sampled, ", size ", counts.size,
-                      counts.seed_buffer > 0 ? absl::StrCat(", seed buffer ", counts.seed_buffer, " (counted apart)") : "");
+  return absl::StrCat(
+      "rate limiter (samples_per_insert ", options_.samples_per_insert, ", tolerance ", options_.tolerance,
+      ", min_size ", options_.min_size, ") with inserted ", counts.inserted, ", sampled ", counts.sampled,
+      ", size ", counts.size,
+      counts.seed_buffer > 0 ? absl::StrCat(", seed buffer ", counts.seed_buffer, " (counted apart)") : "");
 }
 
 std::string RateLimiter::WhyInsertWaits(const Counts& counts) const {

@@ -21,18 +21,18 @@ struct RateLimiterOptions {
 // larger than that raises the tolerance to n / 2 for good, before it waits. Then one of the two can always go
 // on.
 //
-// A seed buffer counts as neither inserted nor sampled: `minimum` is min_size less the seed buffer's rows, at least 0, and
-// as long as there is nothing but seed buffer draws are free and are not counted.
+// A seed buffer counts as neither inserted nor sampled: `minimum` is min_size less the seed buffer's rows, at
+// least 0, and as long as there is nothing but seed buffer draws are free and are not counted.
 //
 // Plain arithmetic without clock or lock; the buffer's lock guards it.
 class RateLimiter {
  public:
   // The state that it judges by, over the life of the buffer.
   struct Counts {
-    std::uint64_t inserted = 0;  // without the seed buffer
-    std::uint64_t sampled = 0;   // since the first of these
-    std::uint64_t size = 0;      // all that is held
-    std::uint64_t seed_buffer = 0;      // rows that the buffer was begun with
+    std::uint64_t inserted = 0;     // without the seed buffer
+    std::uint64_t sampled = 0;      // since the first of these
+    std::uint64_t size = 0;         // all that is held
+    std::uint64_t seed_buffer = 0;  // rows that the buffer was begun with
   };
 
   // InvalidArgument for negative or non-finite numbers and for a minimum size of 0 or above `capacity`.

@@ -1,5 +1,7 @@
 #include "replay/client/client.h"
 
+#include <grpcpp/grpcpp.h>
+
 #include <algorithm>
 #include <set>
 #include <utility>
@@ -8,6 +10,7 @@
 #include "absl/synchronization/mutex.h"
 #include "absl/time/clock.h"
 #include "core/status_macros.h"
+#include "proto/replay.grpc.pb.h"
 #include "proto/rpc/channel.h"
 #include "proto/rpc/codec.h"
 #include "proto/rpc/grpc_status.h"

@@ -1,8 +1,6 @@
 // Typed calls to the replay server for everything but inserting (replay/client/writer.h).
 #pragma once
 
-#include <grpcpp/grpcpp.h>
-
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -13,7 +11,7 @@
 #include "absl/time/time.h"
 #include "absl/types/span.h"
 #include "core/batch.h"
-#include "proto/replay.grpc.pb.h"
+#include "proto/replay.pb.h"
 
 namespace dbr {
 

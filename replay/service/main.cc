@@ -37,10 +37,12 @@ absl::StatusOr<ReplayServerOptions> MakeOptions(const ServiceArguments& argument
 
 void LogSeedBuffer(const std::string& path, const SeedBufferRecord& seed_buffer) {
   spdlog::info(
-      "seed buffer {}: {} transitions, {} whole episodes with a mean return of {:.1f}, loaded at {:.0f} rows/s",
+      "seed buffer {}: {} transitions, {} whole episodes with a mean return of {:.1f}, loaded at {:.0f} "
+      "rows/s",
       path, seed_buffer.rows, seed_buffer.episodes, seed_buffer.return_mean, seed_buffer.rows_per_second);
   if (seed_buffer.bad_rows > 0)
-    spdlog::warn("seed buffer {}: {} rows with values that are not finite are left out", path, seed_buffer.bad_rows);
+    spdlog::warn("seed buffer {}: {} rows with values that are not finite are left out", path,
+                 seed_buffer.bad_rows);
 }
 
 absl::Status Serve(const ServiceArguments& arguments, const Config& config) {
@@ -54,7 +56,7 @@ absl::Status Serve(const ServiceArguments& arguments, const Config& config) {
     spdlog::info("resumed {} with {} transitions; {} were incomplete and are dropped", options.store.path,
                  server->recovered(), server->torn());
   }
-  if (!options.seed_buffer.path.empty()) LogSeedBuffer(options.seed_buffer.path, server->seed_buffer_buffer());
+  if (!options.seed_buffer.path.empty()) LogSeedBuffer(options.seed_buffer.path, server->seed_buffer());
   spdlog::info("listening on {}", server->address());
   stop.WaitForNotification();
   spdlog::info("stopping");

@@ -8,6 +8,7 @@
 
 #include "core/status_macros.h"
 #include "proto/config/config_file.h"
+#include "replay/service/service.h"
 
 namespace dbr {
 
@@ -44,6 +45,9 @@ SeedBufferOptions SeedBufferOptionsFrom(const Config& config) {
           .others_will_come = !TrainsOfflineAlone(config)};
 }
 
+ReplayServer::ReplayServer(std::unique_ptr<PartitionedBuffer> buffer)
+    : buffer_(std::move(buffer)), service_(std::make_unique<ReplayService>(buffer_.get())) {}
+
 absl::StatusOr<std::unique_ptr<ReplayServer>> ReplayServer::Start(const ReplayServerOptions& options) {
   ASSIGN_OR_RETURN(std::unique_ptr<TransitionStore> store, TransitionStore::Open(options.store));
   auto server = StartWith(options, std::move(store));
@@ -64,7 +68,7 @@ absl::StatusOr<std::unique_ptr<ReplayServer>> ReplayServer::StartWith(
   if (!options.seed_buffer.path.empty()) {
     ASSIGN_OR_RETURN(server->seed_buffer_, ImportSeedBuffer(options.seed_buffer, server->buffer_.get()));
   }
-  const std::vector<grpc::Service*> services = {&server->service_};
+  const std::vector<grpc::Service*> services = {server->service_.get()};
   ASSIGN_OR_RETURN(server->running_, StartServer(options.server, services));
   return server;
 }

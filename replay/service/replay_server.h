@@ -10,11 +10,12 @@
 #include "proto/rpc/server.h"
 #include "replay/buffer/partitioned_buffer.h"
 #include "replay/service/seed_buffer_import.h"
-#include "replay/service/service.h"
 #include "replay/store/seed_buffer_record.h"
 #include "replay/store/transition_store.h"
 
 namespace dbr {
+
+class ReplayService;
 
 struct ReplayServerOptions {
   StoreOptions store;
@@ -33,8 +34,8 @@ SeedBufferOptions SeedBufferOptionsFrom(const Config& config);
 // A running replay server. Thread-compatible.
 class ReplayServer {
  public:
-  // Loads the seed buffer before it serves. Errors of TransitionStore::Open, PartitionedBuffer::Make, ImportSeedBuffer and
-  // StartServer.
+  // Loads the seed buffer before it serves. Errors of TransitionStore::Open, PartitionedBuffer::Make,
+  // ImportSeedBuffer and StartServer.
   static absl::StatusOr<std::unique_ptr<ReplayServer>> Start(const ReplayServerOptions& options);
   ~ReplayServer();  // Stop()
   ReplayServer(const ReplayServer&) = delete;
@@ -53,11 +54,10 @@ class ReplayServer {
  private:
   static absl::StatusOr<std::unique_ptr<ReplayServer>> StartWith(const ReplayServerOptions& options,
                                                                  std::unique_ptr<TransitionStore> store);
-  explicit ReplayServer(std::unique_ptr<PartitionedBuffer> buffer)
-      : buffer_(std::move(buffer)), service_(buffer_.get()) {}
+  explicit ReplayServer(std::unique_ptr<PartitionedBuffer> buffer);
 
   std::unique_ptr<PartitionedBuffer> buffer_;
-  ReplayService service_;
+  const std::unique_ptr<ReplayService> service_;
   RunningServer running_;
   SeedBufferRecord seed_buffer_;
   std::uint64_t recovered_ = 0;

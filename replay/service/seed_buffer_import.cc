@@ -16,18 +16,18 @@ namespace {
 
 absl::Status CheckEnough(const SeedBufferOptions& options, std::uint64_t transitions) {
   if (transitions > 0 && transitions >= options.min_rows) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("replay.seed_buffer.path: expected at least ", std::max<std::uint64_t>(1, options.min_rows),
-                   " transitions (replay.min_size, before which nothing is drawn), found ", transitions,
-                   " in ", options.path, ". Lower replay.min_size or take a larger seed."));
+  return absl::InvalidArgumentError(absl::StrCat(
+      "replay.seed_buffer.path: expected at least ", std::max<std::uint64_t>(1, options.min_rows),
+      " transitions (replay.min_size, before which nothing is drawn), found ", transitions, " in ",
+      options.path, ". Lower replay.min_size or take a larger seed."));
 }
 
 absl::Status CheckRoom(const SeedBufferOptions& options, std::uint64_t transitions, std::uint64_t capacity) {
   if (transitions > capacity) {
-    return absl::InvalidArgumentError(absl::StrCat("replay.seed_buffer.path: the seed buffer ", options.path, " has ",
-                                                   transitions, " transitions, the buffer has room for ",
-                                                   capacity, ". Raise replay.capacity to more than ",
-                                                   transitions, "."));
+    return absl::InvalidArgumentError(
+        absl::StrCat("replay.seed_buffer.path: the seed buffer ", options.path, " has ", transitions,
+                     " transitions, the buffer has room for ", capacity,
+                     ". Raise replay.capacity to more than ", transitions, "."));
   }
   if (transitions == capacity && options.others_will_come && !options.evict) {
     return absl::InvalidArgumentError(absl::StrCat(
@@ -49,11 +49,11 @@ absl::StatusOr<std::unique_ptr<DatasetReader>> OpenFitting(const SeedBufferOptio
                      options.env));
   }
   if (layout.return_width > 0 && options.discount >= 1) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("algorithm.discount: expected below 1 where the returns of a seed buffer are needed (advantage "
-                     "SIL), for those of "
-                     "episodes that were cut have no bound else, found ",
-                     options.discount));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "algorithm.discount: expected below 1 where the returns of a seed buffer are needed (advantage "
+        "SIL), for those of "
+        "episodes that were cut have no bound else, found ",
+        options.discount));
   }
   DatasetOptions dataset{.env = options.env,
                          .observation_size = layout.observation_width,
@@ -107,11 +107,12 @@ class SeedBufferRows {
 }  // namespace
 
 absl::Status CheckSeedBufferFits(const SeedBufferOptions& options, const TransitionLayout& layout,
-                           std::uint64_t capacity) {
+                                 std::uint64_t capacity) {
   return OpenFitting(options, layout, capacity).status();
 }
 
-absl::StatusOr<SeedBufferRecord> ImportSeedBuffer(const SeedBufferOptions& options, PartitionedBuffer* buffer) {
+absl::StatusOr<SeedBufferRecord> ImportSeedBuffer(const SeedBufferOptions& options,
+                                                  PartitionedBuffer* buffer) {
   const BufferStats before = buffer->Stats();
   if (before.seed_buffer_record.complete != 0) return before.seed_buffer_record;
   const absl::Time start = absl::Now();
@@ -119,7 +120,8 @@ absl::StatusOr<SeedBufferRecord> ImportSeedBuffer(const SeedBufferOptions& optio
   ASSIGN_OR_RETURN(const std::unique_ptr<DatasetReader> reader,
                    OpenFitting(options, layout, buffer->capacity()));
   SeedBufferRows seed_buffer(reader.get(), layout, options.discount);
-  std::uint64_t held_already = before.seed_buffer_rows * static_cast<std::uint64_t>(layout.stride());  // floats
+  std::uint64_t held_already =
+      before.seed_buffer_rows * static_cast<std::uint64_t>(layout.stride());  // floats
   for (;;) {
     ASSIGN_OR_RETURN(const absl::Span<const float> rows, seed_buffer.Next());
     if (rows.empty()) break;

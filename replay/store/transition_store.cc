@@ -112,10 +112,11 @@ void TransitionStore::Pin(std::uint64_t rows) {
 
 absl::Status TransitionStore::Recover() {
   if (seed_buffer_->complete != 0) {
-    if (seed_buffer_->complete != 1 || seed_buffer_->pinned > capacity_ || seed_buffer_->pinned > seed_buffer_->rows) {
+    if (seed_buffer_->complete != 1 || seed_buffer_->pinned > capacity_ ||
+        seed_buffer_->pinned > seed_buffer_->rows) {
       return absl::DataLossError(absl::StrCat("replay store: its record of the seed buffer is damaged (rows ",
-                                              seed_buffer_->rows, ", pinned ", seed_buffer_->pinned, ", capacity ",
-                                              capacity_, "). Start a new run."));
+                                              seed_buffer_->rows, ", pinned ", seed_buffer_->pinned,
+                                              ", capacity ", capacity_, "). Start a new run."));
     }
     Pin(seed_buffer_->pinned);
   }

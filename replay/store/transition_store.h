@@ -36,11 +36,11 @@ struct RowLabels {
 };
 
 // Rows enter at the newest end and leave at the oldest. Each has a key, counted from 1 and never used again,
-// so that the slot of a key is arithmetic. A store may be begun with a seed buffer of offline data, which has the
-// first keys; where it is pinned it stays in the first slots, and the others are a ring for what comes later:
-// the held keys are [1, pinned] and [oldest_key, next_key), and key k > pinned lies in slot
-// pinned + (k - 1 - pinned) % (capacity - pinned). As long as nothing was evicted key k lies in slot k - 1,
-// pinned or not.
+// so that the slot of a key is arithmetic. A store may be begun with a seed buffer of offline data, which has
+// the first keys; where it is pinned it stays in the first slots, and the others are a ring for what comes
+// later: the held keys are [1, pinned] and [oldest_key, next_key), and key k > pinned lies in slot pinned +
+// (k - 1 - pinned) % (capacity - pinned). As long as nothing was evicted key k lies in slot k - 1, pinned or
+// not.
 //
 // A row in a file is committed by its key, written last, after the old key was struck out: a row torn by a
 // kill has no key and is not there on reopening, and the one before it is the newest. Thread-compatible: the
@@ -61,10 +61,11 @@ class TransitionStore {
   // Appends a row of the seed buffer, flat as layout() says. Requires that nothing else came before, and
   // size() < capacity().
   std::uint32_t AppendSeedBuffer(const float* row, const RowLabels& labels);
-  // Ends the seed buffer: writes down `record`, with rows = seed_buffer_rows(), and pins all of them where asked.
+  // Ends the seed buffer: writes down `record`, with rows = seed_buffer_rows(), and pins all of them where
+  // asked.
   void CompleteSeedBuffer(SeedBufferRecord record, bool pin);
-  const SeedBufferRecord& seed_buffer() const { return *seed_buffer_; }       // zeros before CompleteSeedBuffer
-  std::uint64_t seed_buffer_rows() const { return seed_buffer_rows_; }  // that ever came in
+  const SeedBufferRecord& seed_buffer() const { return *seed_buffer_; }  // zeros before CompleteSeedBuffer
+  std::uint64_t seed_buffer_rows() const { return seed_buffer_rows_; }   // that ever came in
   std::uint64_t seed_buffer_held() const {
     return pinned_ > 0 ? pinned_ : seed_buffer_rows_ - std::min(seed_buffer_rows_, oldest_key() - 1);
   }
@@ -77,7 +78,8 @@ class TransitionStore {
     if (key <= pinned_) return static_cast<std::uint32_t>(key - 1);
     return static_cast<std::uint32_t>(pinned_ + (key - 1 - pinned_) % ring_);
   }
-  // Key of the held row that `rank` held rows are older than; the seed buffer's rows come first. rank < size().
+  // Key of the held row that `rank` held rows are older than; the seed buffer's rows come first. rank <
+  // size().
   std::uint64_t KeyAtRank(std::uint64_t rank) const {
     return rank < pinned_ ? rank + 1 : oldest_key() + (rank - pinned_);
   }

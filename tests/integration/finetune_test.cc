@@ -91,8 +91,8 @@ TEST_F(FinetuneTest, GoesOnlineAfterTheOfflinePhaseAndKeepsItsSeedOverAResume) {
   const auto [status, output] = RunProgram("dbr", {"launch", "--resume", "--run-dir", run_.root, "--set",
                                                    absl::StrCat("launch.max_steps=", steps)});
   ASSERT_EQ(status, 0) << output;
-  EXPECT_THAT(output,
-              AllOf(HasSubstr("reached max_steps"), HasSubstr("of the seed buffer"), HasSubstr("at the end")));
+  EXPECT_THAT(output, AllOf(HasSubstr("reached max_steps"), HasSubstr("of the seed buffer"),
+                            HasSubstr("at the end")));
   const Json second = Summary(run_);
   EXPECT_EQ(second["ended"], "max_steps");
   EXPECT_EQ(second["launches"], 2);

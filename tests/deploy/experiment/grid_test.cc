@@ -142,7 +142,8 @@ TEST_F(GridTest, WhatDiffersAtOneScaleHoldsThereAlone) {
 }
 
 TEST_F(GridTest, SeedBuffersLieInTheDataFolder) {
-  EXPECT_EQ(ConfigOf("hopper-medium/sac/seed-1").replay().seed_buffer().path(), folder_ / "hopper-medium.hdf5");
+  EXPECT_EQ(ConfigOf("hopper-medium/sac/seed-1").replay().seed_buffer().path(),
+            folder_ / "hopper-medium.hdf5");
   EXPECT_EQ(ConfigOf("hopper/sac/seed-1").replay().seed_buffer().path(), "");
 }
 
@@ -291,9 +292,10 @@ TEST_F(GridTest, RefusesAnUnknownEnvironment) {
 TEST_F(GridTest, AnOfflineTaskHasASeedBufferAndNoActors) {
   EXPECT_THAT(
       ErrorsOf({{"replay { seed { path: \"hopper-medium.hdf5\" } }", ""}}),
-      ElementsAre("task 'hopper-medium', contender 'dbr': replay.seed_buffer.path: expected the seed buffer of "
-                  "an offline task, found none",
-                  StartsWith("task 'hopper-medium', contender 'sac': replay.seed_buffer.path")));
+      ElementsAre(
+          "task 'hopper-medium', contender 'dbr': replay.seed_buffer.path: expected the seed buffer of "
+          "an offline task, found none",
+          StartsWith("task 'hopper-medium', contender 'sac': replay.seed_buffer.path")));
   EXPECT_THAT(
       ErrorsOf({{"offline_updates: 7 max_updates: 7", "offline_updates: 7 max_updates: 8"}}),
       IsSupersetOf({std::string(

@@ -50,7 +50,8 @@ class SeedBufferPlanTest : public testing::Test {
   }
 
   LaunchOptions Options(const std::string& seed_buffer, std::vector<std::string> overrides = {}) const {
-    return {.config = config_, .overrides = std::move(overrides), .run_dir = run_, .seed_buffer = seed_buffer};
+    return {
+        .config = config_, .overrides = std::move(overrides), .run_dir = run_, .seed_buffer = seed_buffer};
   }
   // Why there is no plan, and no folder.
   std::string Refusal(const LaunchOptions& options) const {

@@ -144,10 +144,11 @@ TEST(ParseConfigTest, NoNumberOfTheSchemaMayBeInfinite) {
 }
 
 TEST(OverrideTest, SetsFieldsByTheirPath) {
-  const Config config = Parsed(
-      "algorithm { dbr { constraint: FIXED epsilon: 0.2 } } env { opponents: \"random\" }",
-      {"algorithm.dbr.epsilon=0.1", "env.opponents=[one_ply, \"mcts:10\"]", "network.hidden_sizes=64",
-       "actor.mode=SUPPORT", "learner.address=unix:/run/a=b.sock", "replay.seed_buffer.evict=true", "seed = 9"});
+  const Config config =
+      Parsed("algorithm { dbr { constraint: FIXED epsilon: 0.2 } } env { opponents: \"random\" }",
+             {"algorithm.dbr.epsilon=0.1", "env.opponents=[one_ply, \"mcts:10\"]", "network.hidden_sizes=64",
+              "actor.mode=SUPPORT", "learner.address=unix:/run/a=b.sock", "replay.seed_buffer.evict=true",
+              "seed = 9"});
   EXPECT_EQ(config.algorithm().dbr().constraint(), DbrConfig::FIXED);
   EXPECT_EQ(config.algorithm().dbr().epsilon(), 0.1);
   EXPECT_THAT(config.env().opponents(), ElementsAre("one_ply", "mcts:10"));

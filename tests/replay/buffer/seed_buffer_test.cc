@@ -170,7 +170,8 @@ TEST_F(BufferWithSeedBuffer, ASeedThatHasEveryPlaceLeavesNoneForOthers) {
   MakeSeeded(100);
   const absl::Status status = Insert(1001, 1);
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_THAT(status.ToString(), AllOf(HasSubstr("seed buffer of 100"), HasSubstr("replay.seed_buffer.evict")));
+  EXPECT_THAT(status.ToString(),
+              AllOf(HasSubstr("seed buffer of 100"), HasSubstr("replay.seed_buffer.evict")));
   EXPECT_EQ(Relabel(1, {1, 100, 101}, {1, 1, 1}).evicted, 1u);
   EXPECT_TRUE(Draw(10, 10, 0).ok());
 }

@@ -222,8 +222,8 @@ TEST_F(SeedBufferImportTest, ASeedLargerThanTheCapacityIsRefusedWithBothNumbers)
 
 TEST_F(SeedBufferImportTest, ASeedThatFillsTheBufferMustLeaveRoomForActors) {
   options_.store.capacity = rows();
-  EXPECT_THAT(StartError().ToString(),
-              AllOf(HasSubstr(absl::StrCat("all ", rows(), " places")), HasSubstr("replay.seed_buffer.evict")));
+  EXPECT_THAT(StartError().ToString(), AllOf(HasSubstr(absl::StrCat("all ", rows(), " places")),
+                                             HasSubstr("replay.seed_buffer.evict")));
   options_.seed_buffer.evict = true;
   Start();
   options_.seed_buffer.evict = false;

@@ -1,0 +1,32 @@
+// Typed calls to the learner for everything but the stream of policies (actor/policy_subscriber.h).
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+#include "proto/policy.pb.h"
+
+namespace dbr {
+
+// Thread-safe; calls block until their timeout. Errors carry the server's message: Unavailable where there is
+// no learner, DeadlineExceeded where it did not answer.
+class LearnerClient {
+ public:
+  explicit LearnerClient(const std::string& address);
+  ~LearnerClient();
+  LearnerClient(const LearnerClient&) = delete;
+  LearnerClient& operator=(const LearnerClient&) = delete;
+
+  absl::StatusOr<LearnerStatus> Status(absl::Duration timeout);
+  // InvalidArgument for a report without episodes or without a finite mean return.
+  absl::Status ReportEvaluation(const EvaluationReport& report, absl::Duration timeout);
+
+ private:
+  class Impl;  // the generated stubs are costly to compile, so that no header holds them
+  const std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dbr
