@@ -38,9 +38,7 @@ struct PolicySubscriber::Stub {
 };
 
 PolicySubscriber::PolicySubscriber(SubscriberOptions options)
-    : options_(std::move(options)),
-      stub_(std::make_unique<Stub>(options_.address)),
-      rng_(options_.seed) {
+    : options_(std::move(options)), stub_(std::make_unique<Stub>(options_.address)), rng_(options_.seed) {
   thread_ = std::thread(&PolicySubscriber::Run, this);
 }
 

@@ -60,7 +60,7 @@ set(DBR_PCH_PLAIN <algorithm> <array> <atomic> <cmath> <cstdint> <cstring> <func
   <utility> <vector> <absl/status/status.h> <absl/status/statusor.h> <absl/strings/str_cat.h> <absl/strings/str_join.h>
   <absl/synchronization/mutex.h> <absl/time/time.h> <absl/types/span.h> <Eigen/Core>)
 set(DBR_PCH_RPC ${DBR_PCH_PLAIN} <grpcpp/grpcpp.h> <spdlog/spdlog.h>)
-set(DBR_PCH_TOOL ${DBR_PCH_RPC} <filesystem> <map> <set> <CLI/CLI.hpp> <nlohmann/json.hpp>)
+set(DBR_PCH_TOOL ${DBR_PCH_RPC} <filesystem> <map> <set> <nlohmann/json.hpp>)
 set(DBR_PCH_TEST ${DBR_PCH_PLAIN} <filesystem> <fstream> <map> <set> <sstream> <thread> <gmock/gmock.h> <gtest/gtest.h>
   <nlohmann/json.hpp>)
 
@@ -100,15 +100,17 @@ function(dbr_binary name)
   dbr_use_precompiled(${name} tool)
 endfunction()
 
-# dbr_test(NAME SRCS a_test.cc DEPS libs... LABELS slow TIMEOUT 60): a GoogleTest program that ctest runs as one test.
+# dbr_test(NAME SRCS a_test.cc DEPS libs... LABELS slow TIMEOUT 60 PROGRAMS dbr dbr-actor CORES 2): a GoogleTest program.
+# ctest finds its tests in it and runs each by itself, as NAME/Suite.Test: several at once, TIMEOUT seconds at most for each
+# (120 unless it is given). PROGRAMS are built before it; a test that starts whole runs takes CORES of those that ctest shares out.
 # Reference data: DBR_REFERENCE_DIR in the environment, else tests/reference (compiled in as DBR_DEFAULT_REFERENCE_DIR).
 function(dbr_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SRCS;DEPS;LABELS" ${ARGN})
-  if(NOT DBR_TESTS)
-    return()
-  endif()
+  cmake_parse_arguments(ARG "" "TIMEOUT;CORES" "SRCS;DEPS;LABELS;PROGRAMS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
+  endif()
+  if(NOT ARG_CORES)
+    set(ARG_CORES 1)
   endif()
   add_executable(${name} ${ARG_SRCS})
   target_link_libraries(${name} PRIVATE dbr_flags dbr_warnings ${ARG_DEPS} GTest::gmock GTest::gtest GTest::gtest_main)
@@ -118,6 +120,9 @@ function(dbr_test name)
     DBR_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   dbr_use_precompiled(${name} test)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
-  add_test(NAME ${name} COMMAND ${name})
-  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}" ENVIRONMENT "OPENBLAS_NUM_THREADS=1")
+  if(ARG_PROGRAMS)
+    add_dependencies(${name} ${ARG_PROGRAMS})
+  endif()
+  gtest_discover_tests(${name} TEST_PREFIX "${name}/" DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
+    PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}" PROCESSORS ${ARG_CORES} ENVIRONMENT OPENBLAS_NUM_THREADS=1)
 endfunction()

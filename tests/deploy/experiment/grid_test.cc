@@ -35,7 +35,7 @@ task {
 task { name: "hopper" kind: ONLINE config { env { name: "hopper" } } }
 task {
   name: "hopper-medium" kind: OFFLINE record_command: "dbr dataset record --env hopper --quality medium --steps 1000"
-  config { env { name: "hopper" } replay { seed { path: "hopper-medium.hdf5" } } }
+  config { env { name: "hopper" } replay { seed_buffer { path: "hopper-medium.hdf5" } } }
 }
 contender {
   name: "dbr" task: "*"
@@ -291,7 +291,7 @@ TEST_F(GridTest, RefusesAnUnknownEnvironment) {
 
 TEST_F(GridTest, AnOfflineTaskHasASeedBufferAndNoActors) {
   EXPECT_THAT(
-      ErrorsOf({{"replay { seed { path: \"hopper-medium.hdf5\" } }", ""}}),
+      ErrorsOf({{"replay { seed_buffer { path: \"hopper-medium.hdf5\" } }", ""}}),
       ElementsAre(
           "task 'hopper-medium', contender 'dbr': replay.seed_buffer.path: expected the seed buffer of "
           "an offline task, found none",

@@ -168,7 +168,7 @@ TEST(RobotResultsTest, TheSummaryHoldsTheCurveAndThePhases) {
   const Json json = Json::parse(*ReadFile(run.summary()));
   EXPECT_EQ(json["seed_buffer"]["path"], "medium.hdf5");
   EXPECT_EQ(json["seed_buffer"]["rows"], 1000000);
-  EXPECT_EQ(json["returns"]["seed"], 1078.3);
+  EXPECT_EQ(json["returns"]["seed_buffer"], 1078.3);
   EXPECT_EQ(json["returns"]["after_offline"]["return_mean"], 1099.1);
   EXPECT_EQ(json["returns"]["lowest_online"]["updates"], 2000);
   EXPECT_EQ(json["returns"]["end"]["mean"], 2100.4);
@@ -198,8 +198,8 @@ TEST(SeedBufferStatsTest, TellOfTheSharesOfTheSeed) {
   EXPECT_THAT(text, AllOf(HasSubstr("75% of D,  25% of D+,  50% of D-"),
                           HasSubstr("1,000,000 transitions came in"), HasSubstr("1078.3")));
   const Json json = ToJson(stats);
-  EXPECT_EQ(json["sources"]["seed"]["share"], 0.75);
-  EXPECT_EQ(json["sources"]["seed"]["plus_share"], 0.25);
+  EXPECT_EQ(json["sources"]["seed_buffer"]["share"], 0.75);
+  EXPECT_EQ(json["sources"]["seed_buffer"]["plus_share"], 0.25);
   EXPECT_EQ(json["sources"]["online"]["minus_share"], 0.5);
   EXPECT_EQ(json["seed_buffer_rows"], 1000000);
   EXPECT_EQ(json["seed_buffer_return_mean"], 1078.3);

@@ -13,6 +13,8 @@
 #include "deploy/launch/monitor.h"
 #include "deploy/launch/run_access.h"
 #include "proto/config/config_file.h"
+#include "proto/policy.grpc.pb.h"
+#include "proto/replay.grpc.pb.h"
 #include "proto/rpc/server.h"
 #include "tests/support/temp_dir.h"
 

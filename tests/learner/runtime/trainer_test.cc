@@ -10,6 +10,7 @@
 
 #include "absl/time/clock.h"
 #include "learner/algorithms/registry.h"
+#include "learner/runtime/policy_service.h"
 #include "proto/config/config_file.h"
 #include "replay/client/writer.h"
 #include "replay/service/replay_server.h"

@@ -159,6 +159,21 @@ TEST(OverrideTest, SetsFieldsByTheirPath) {
   EXPECT_EQ(config.seed(), 9u);
 }
 
+TEST(ConfigNamesTest, AFormerNameIsRefusedWithTheNewOne) {
+  EXPECT_THAT(ErrorsOf("replay { seed { share: 0.5 } }"),
+              ElementsAre(HasSubstr("replay.seed: this field is now called 'seed_buffer'")));
+  EXPECT_THAT(ErrorsOf("", {"replay.seed.share=0.5"}),
+              ElementsAre(HasSubstr("replay.seed: this field is now called 'seed_buffer'")));
+}
+
+TEST(ConfigNamesTest, AnAliasIsTheSameField) {
+  const Config config = Parsed("algorithm { sac_discrete { first_temperature: 0.5 } }",
+                               {"algorithm.sac_discrete.target_entropy_ratio=0.3"});
+  EXPECT_EQ(config.algorithm().discrete_sac().first_temperature(), 0.5);
+  EXPECT_EQ(config.algorithm().discrete_sac().target_entropy_ratio(), 0.3);
+  EXPECT_THAT(PrintConfig(config), HasSubstr("discrete_sac"));
+}
+
 TEST(OverrideTest, EmptiesAListAndReplacesAMessage) {
   const Config config =
       Parsed("env { opponents: \"random\" } algorithm { dbr { constraint: FIXED epsilon: 0.2 } }",

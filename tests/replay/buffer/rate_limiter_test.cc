@@ -99,22 +99,24 @@ TEST(RateLimiter, RefusesBoundsThatMakeNoSense) {
 
 TEST(RateLimiter, IsIdleWhileThereIsNothingButSeed) {
   const RateLimiter limiter = Make(4, 40, 10);
-  EXPECT_TRUE(limiter.CanDraw({.inserted = 0, .sampled = 0, .size = 100, .seed = 100}, 1000000));
-  EXPECT_TRUE(limiter.CanInsert({.inserted = 0, .sampled = 0, .size = 100, .seed = 100}));
-  EXPECT_FALSE(limiter.CanDraw({.inserted = 0, .sampled = 0, .size = 9, .seed = 9}, 1)) << "min_size holds";
+  EXPECT_TRUE(limiter.CanDraw({.inserted = 0, .sampled = 0, .size = 100, .seed_buffer = 100}, 1000000));
+  EXPECT_TRUE(limiter.CanInsert({.inserted = 0, .sampled = 0, .size = 100, .seed_buffer = 100}));
+  EXPECT_FALSE(limiter.CanDraw({.inserted = 0, .sampled = 0, .size = 9, .seed_buffer = 9}, 1))
+      << "min_size holds";
 }
 
 TEST(RateLimiter, CountsOnlineRowsFromTheFirstWhereTheSeedHasTheMinimum) {
   const RateLimiter limiter = Make(4, 40, 10);
-  EXPECT_TRUE(limiter.CanDraw({.inserted = 1, .sampled = 0, .size = 101, .seed = 100}, 44));  // 4 * 1 + 40
-  EXPECT_FALSE(limiter.CanDraw({.inserted = 1, .sampled = 0, .size = 101, .seed = 100}, 45));
-  EXPECT_TRUE(limiter.CanInsert({.inserted = 10, .sampled = 0, .size = 110, .seed = 100}));   // 40
-  EXPECT_FALSE(limiter.CanInsert({.inserted = 11, .sampled = 0, .size = 111, .seed = 100}));  // 44
+  EXPECT_TRUE(
+      limiter.CanDraw({.inserted = 1, .sampled = 0, .size = 101, .seed_buffer = 100}, 44));  // 4 * 1 + 40
+  EXPECT_FALSE(limiter.CanDraw({.inserted = 1, .sampled = 0, .size = 101, .seed_buffer = 100}, 45));
+  EXPECT_TRUE(limiter.CanInsert({.inserted = 10, .sampled = 0, .size = 110, .seed_buffer = 100}));   // 40
+  EXPECT_FALSE(limiter.CanInsert({.inserted = 11, .sampled = 0, .size = 111, .seed_buffer = 100}));  // 44
   // A seed of 6 leaves 4 of the minimum to the others.
-  EXPECT_TRUE(limiter.CanInsert({.inserted = 14, .sampled = 0, .size = 20, .seed = 6}));
-  EXPECT_FALSE(limiter.CanInsert({.inserted = 15, .sampled = 0, .size = 21, .seed = 6}));
-  EXPECT_THAT(limiter.WhyInsertWaits({.inserted = 15, .sampled = 0, .size = 21, .seed = 6}),
-              AllOf(HasSubstr("seed 6"), HasSubstr("(inserted - 4)")));
+  EXPECT_TRUE(limiter.CanInsert({.inserted = 14, .sampled = 0, .size = 20, .seed_buffer = 6}));
+  EXPECT_FALSE(limiter.CanInsert({.inserted = 15, .sampled = 0, .size = 21, .seed_buffer = 6}));
+  EXPECT_THAT(limiter.WhyInsertWaits({.inserted = 15, .sampled = 0, .size = 21, .seed_buffer = 6}),
+              AllOf(HasSubstr("seed buffer 6"), HasSubstr("(inserted - 4)")));
 }
 
 }  // namespace

@@ -272,7 +272,7 @@ TEST_F(StoreInAFile, SurvivesDamageBehindTheHeader) {
   const auto bytes = static_cast<std::streamoff>(std::filesystem::file_size(options_.path));
   Damage(4096, std::string(static_cast<std::size_t>(bytes - 4096), '\xab'));
   EXPECT_EQ(ResumeError().code(), absl::StatusCode::kDataLoss);
-  EXPECT_THAT(ResumeError().ToString(), HasSubstr("record of the seed is damaged"));
+  EXPECT_THAT(ResumeError().ToString(), HasSubstr("record of the seed buffer is damaged"));
   Damage(4096, std::string(1024, '\0'));  // the counters and that record
   auto store = Resume();
   ASSERT_NE(store, nullptr);
