@@ -6,6 +6,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 
+// NOLINTBEGIN(bugprone-macro-parentheses): a declaration cannot stand in parentheses.
 #define DBR_CONCAT_INNER(a, b) a##b
 #define DBR_CONCAT(a, b) DBR_CONCAT_INNER(a, b)
 
@@ -20,3 +21,4 @@
   auto statusor = (expression);                                   \
   if (!statusor.ok()) return statusor.status();                   \
   declaration = std::move(statusor).value()
+// NOLINTEND(bugprone-macro-parentheses)
