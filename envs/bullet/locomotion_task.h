@@ -81,7 +81,6 @@ class LocomotionTask {
   void GetFigure(Figure* figure) const;
 
   absl::Span<const float> feet_on_floor() const { return feet_on_floor_; }
-  double start_height_m() const { return start_height_m_; }
   double potential() const { return potential_; }
 
  private:

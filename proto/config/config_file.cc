@@ -92,12 +92,6 @@ absl::StatusOr<Config> ParseConfig(absl::string_view text, const std::vector<std
   return Parse(text, overrides, "config");
 }
 
-absl::Status CheckBounds(const Message& message) {
-  std::vector<std::string> errors;
-  FindViolations(message, "", &errors);
-  return AllErrors(errors, "config");
-}
-
 std::string PrintConfig(const Config& config) {
   Config effective = config;
   DefaultAlgorithm(&effective);

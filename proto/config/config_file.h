@@ -18,10 +18,6 @@ namespace dbr {
 absl::StatusOr<Config> LoadConfig(const std::string& path, const std::vector<std::string>& overrides = {});
 absl::StatusOr<Config> ParseConfig(absl::string_view text, const std::vector<std::string>& overrides = {});
 
-// Checks every field of `message` against the (bounds) and (required_text) options of the schema, nested ones
-// too.
-absl::Status CheckBounds(const google::protobuf::Message& message);
-
 // The effective config as text, every field with its value, defaults included; ParseConfig reads it back.
 std::string PrintConfig(const Config& config);
 

@@ -38,11 +38,6 @@ void CopyColumn(const Column& column, Matrix* matrix) {
 
 }  // namespace
 
-TransitionLayout LayoutOf(const TransitionBatch& batch) {
-  return {static_cast<int>(batch.observation_width()), static_cast<int>(batch.action_width()),
-          static_cast<int>(batch.mask_width()), static_cast<int>(batch.return_width())};
-}
-
 void SetLayout(const TransitionLayout& layout, TransitionBatch* batch) {
   batch->set_observation_width(layout.observation_width);
   batch->set_action_width(layout.action_width);
@@ -90,19 +85,6 @@ void AppendTransition(const TransitionView& transition, float advantage, std::ui
   batch->add_advantages(advantage);
   batch->add_critic_versions(critic_version);
   batch->set_count(batch->count() + 1);
-}
-
-TransitionView RowOf(const TransitionBatch& batch, int i) {
-  const std::size_t observation = batch.observation_width(), action = batch.action_width(),
-                    mask = batch.mask_width();
-  return {.observation = {batch.observations().data() + i * observation, observation},
-          .action = {batch.actions().data() + i * action, action},
-          .mask = {batch.masks().data() + i * mask, mask},
-          .reward = batch.rewards(i),
-          .discount = batch.discounts(i),
-          .next_observation = {batch.next_observations().data() + i * observation, observation},
-          .next_mask = {batch.next_masks().data() + i * mask, mask},
-          .monte_carlo_return = batch.return_width() > 0 ? batch.returns(i) : kNoReturn};
 }
 
 absl::Status Decode(const TransitionBatch& batch, const TransitionLayout& layout, Batch* out) {

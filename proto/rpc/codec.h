@@ -14,15 +14,11 @@ namespace dbr {
 // Checks that every column has count * width entries and every width is the layout's.
 // InvalidArgument names the column, what was expected and what was found.
 absl::Status CheckShape(const TransitionBatch& batch, const TransitionLayout& layout);
-TransitionLayout LayoutOf(const TransitionBatch& batch);
 void SetLayout(const TransitionLayout& layout, TransitionBatch* batch);
 
 // Appends one transition; `batch` has its layout set. The advantage may be kUnjudged.
 void AppendTransition(const TransitionView& transition, float advantage, std::uint64_t critic_version,
                       TransitionBatch* batch);
-
-// Row `i` of a batch that has passed CheckShape; views into it.
-TransitionView RowOf(const TransitionBatch& batch, int i);
 
 // Copies the columns into `out`, resizing it. InvalidArgument as CheckShape's.
 absl::Status Decode(const TransitionBatch& batch, const TransitionLayout& layout, Batch* out);
