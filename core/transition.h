@@ -2,40 +2,44 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
 
 #include "absl/types/span.h"
+#include "core/columns.h"
 #include "core/space.h"
 
 namespace dbr {
 
+// An advantage that no critic has given yet, and a return that is not there.
 inline constexpr float kUnjudged = std::numeric_limits<float>::quiet_NaN();
 inline constexpr float kNoReturn = std::numeric_limits<float>::quiet_NaN();
 
-// A transition (s, a, r, discount, s') as views into memory of somebody else's.
+// A transition (s, a, r, discount, s') as views into memory that the caller owns.
 // Masks hold 1 for each legal action, 0 for the others, and are empty for a continuous space.
 struct TransitionView {
   absl::Span<const float> observation;
-  absl::Span<const float> action;
+  absl::Span<const float> action;  // a discrete action's index, or a continuous one's dimensions in [-1, 1]
   absl::Span<const float> mask;
   float reward = 0;
   float discount = 0;  // 0 after a true terminal, gamma elsewhere (also where an episode is cut)
   absl::Span<const float> next_observation;
   absl::Span<const float> next_mask;
   // R: the discounted sum of the rewards of the episode from here on, in the environment's units
-  // (core/returns.h). Counts where the layout has a return, and must be finite there.
+  // (core/returns.h). It counts where the layout has a return, and must be finite there.
   float monte_carlo_return = kNoReturn;
 };
 
-// Where the fields of a transition lie in a row of `stride()` floats:
-// [observation | action | mask | reward | discount | return | next_observation | next_mask].
+// Where the values of a transition lie in a row of `stride()` floats, in the order of core/columns.h:
+//
+//   | observation | action | mask | reward | discount | return | next_observation | next_mask |
+//     observation   action   mask      1         1      0 or 1      observation        mask      floats
+//
+// Replay servers, writers and readers of one run have the same layout, and refuse another.
 struct TransitionLayout {
   int observation_width = 0;
-  int action_width = 0;
-  int mask_width = 0;
+  int action_width = 0;  // 1 for a discrete action
+  int mask_width = 0;    // number of discrete actions; 0 for a continuous space
   int return_width = 0;  // 1 where transitions carry their Monte-Carlo return, else 0
 
   // `with_returns`: as NeedsReturns (proto/config/config_file.h) says of the run's config.
@@ -43,44 +47,90 @@ struct TransitionLayout {
     return {spec.observation_size, spec.actions.width(), spec.actions.mask_width(), with_returns ? 1 : 0};
   }
 
-  int action_offset() const { return observation_width; }
-  int mask_offset() const { return action_offset() + action_width; }
-  int reward_offset() const { return mask_offset() + mask_width; }
-  int discount_offset() const { return reward_offset() + 1; }
-  int return_offset() const { return discount_offset() + 1; }
-  int next_observation_offset() const { return return_offset() + return_width; }
-  int next_mask_offset() const { return next_observation_offset() + observation_width; }
-  int stride() const { return next_mask_offset() + mask_width; }
+  ColumnSet<ColumnPlace> columns() const {
+    ColumnSet<ColumnPlace> places;
+    int offset = 0;
+#define DBR_PLACE(value, column, width, Kind)         \
+  places.column = {#column, #value, (width), offset}; \
+  offset += (width);
+    DBR_TRANSITION_COLUMNS(DBR_PLACE)
+#undef DBR_PLACE
+    return places;
+  }
+  // Floats in a row.
+  int stride() const {
+    int floats = 0;
+    ForEachColumn([&floats](const ColumnPlace& place) { floats += place.width; }, columns());
+    return floats;
+  }
+
+  // For who wants one value of a row: the floats before it.
+  int action_offset() const {
+    return columns().actions.offset;
+  }
+  int reward_offset() const {
+    return columns().rewards.offset;
+  }
+  int discount_offset() const {
+    return columns().discounts.offset;
+  }
+  int return_offset() const {
+    return columns().returns.offset;
+  }
+  int next_observation_offset() const {
+    return columns().next_observations.offset;
+  }
+  int next_mask_offset() const {
+    return columns().next_masks.offset;
+  }
 
   bool operator==(const TransitionLayout&) const = default;
 };
 
-// Writes `transition` to `row` [layout.stride()].
+// Pointers to the values of `transition`, by column, to be visited beside other columns.
+inline ColumnSet<const absl::Span<const float>*, const float*> ValuesOf(const TransitionView& transition) {
+#define DBR_POINTER(value, column, width, Kind) .column = &transition.value,
+  return {DBR_TRANSITION_COLUMNS(DBR_POINTER)};
+#undef DBR_POINTER
+}
+inline ColumnSet<absl::Span<const float>*, float*> ValuesOf(TransitionView* transition) {
+#define DBR_POINTER(value, column, width, Kind) .column = &transition->value,
+  return {DBR_TRANSITION_COLUMNS(DBR_POINTER)};
+#undef DBR_POINTER
+}
+
+// The floats of a value, and back: a value becomes what lies at `floats` (a view, or a copy of the one
+// float). `width`: of the value's column; a lone float stays as it was where that is 0.
+inline absl::Span<const float> FloatsOf(const absl::Span<const float>& value, int) {
+  return value;
+}
+inline absl::Span<const float> FloatsOf(const float& value, int width) {
+  return {&value, static_cast<std::size_t>(width)};
+}
+inline void SetValue(const float* floats, int width, absl::Span<const float>* value) {
+  *value = {floats, static_cast<std::size_t>(width)};
+}
+inline void SetValue(const float* floats, int width, float* value) {
+  if (width > 0) *value = *floats;
+}
+
+// Writes `transition` to `row` [layout.stride()]. Its spans have the layout's widths.
 inline void WriteRow(const TransitionView& transition, const TransitionLayout& layout, float* row) {
-  const auto copy = [](absl::Span<const float> values, float* to) {
-    std::copy(values.begin(), values.end(), to);
+  const auto write = [row](const ColumnPlace& place, const auto* value) {
+    const absl::Span<const float> floats = FloatsOf(*value, place.width);
+    std::copy(floats.begin(), floats.end(), row + place.offset);
   };
-  copy(transition.observation, row);
-  copy(transition.action, row + layout.action_offset());
-  copy(transition.mask, row + layout.mask_offset());
-  row[layout.reward_offset()] = transition.reward;
-  row[layout.discount_offset()] = transition.discount;
-  if (layout.return_width > 0) row[layout.return_offset()] = transition.monte_carlo_return;
-  copy(transition.next_observation, row + layout.next_observation_offset());
-  copy(transition.next_mask, row + layout.next_mask_offset());
+  ForEachColumn(write, layout.columns(), ValuesOf(transition));
 }
 
 // The transition that lies in `row` [layout.stride()]; views into it.
 inline TransitionView ViewRow(const float* row, const TransitionLayout& layout) {
-  const std::size_t observation = layout.observation_width, mask = layout.mask_width;
-  return {.observation = {row, observation},
-          .action = {row + layout.action_offset(), static_cast<std::size_t>(layout.action_width)},
-          .mask = {row + layout.mask_offset(), mask},
-          .reward = row[layout.reward_offset()],
-          .discount = row[layout.discount_offset()],
-          .next_observation = {row + layout.next_observation_offset(), observation},
-          .next_mask = {row + layout.next_mask_offset(), mask},
-          .monte_carlo_return = layout.return_width > 0 ? row[layout.return_offset()] : kNoReturn};
+  TransitionView transition;
+  const auto view = [row](const ColumnPlace& place, auto* value) {
+    SetValue(row + place.offset, place.width, value);
+  };
+  ForEachColumn(view, layout.columns(), ValuesOf(&transition));
+  return transition;
 }
 
 // How an episode went; known with the transition that ended it.

@@ -1,5 +1,6 @@
 #include "learner/algorithms/normalized.h"
 
+#include <type_traits>
 #include <utility>
 
 #include "learner/training/policy_export.h"
@@ -96,20 +97,15 @@ class NormalizedAlgorithm final : public Algorithm {
 
  private:
   void Normalize(const Batch& batch, Batch* normalized) const {
-    normalized->actions = batch.actions;
-    normalized->masks = batch.masks;
-    normalized->rewards = batch.rewards;
-    normalized->discounts = batch.discounts;
-    normalized->returns = batch.returns;
-    normalized->next_masks = batch.next_masks;
+    const auto normalize = [this, &batch](const auto& from, auto& to) {
+      if constexpr (std::is_same_v<decltype(to), MatrixX<float>&>) {
+        const bool is_state = &from == &batch.observations || &from == &batch.next_observations;
+        if (is_state && batch.size() > 0) return statistics_.Apply(from, &to);
+      }
+      to = from;
+    };
+    ForEachColumn(normalize, batch, *normalized);
     normalized->keys = batch.keys;
-    if (batch.size() == 0) {
-      normalized->observations = batch.observations;
-      normalized->next_observations = batch.next_observations;
-      return;
-    }
-    statistics_.Apply(batch.observations, &normalized->observations);
-    statistics_.Apply(batch.next_observations, &normalized->next_observations);
   }
 
   FeatureStatistics statistics_;

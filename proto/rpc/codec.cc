@@ -25,10 +25,21 @@ absl::Status CheckWidth(const char* name, int expected, std::uint32_t found) {
                    ". Writers and readers of one replay server share one environment and one algorithm."));
 }
 
-void Append(absl::Span<const float> values, Column* column) {
+// The widths that `batch` says it has.
+TransitionLayout LayoutOf(const TransitionBatch& batch) {
+  return {.observation_width = static_cast<int>(batch.observation_width()),
+          .action_width = static_cast<int>(batch.action_width()),
+          .mask_width = static_cast<int>(batch.mask_width()),
+          .return_width = static_cast<int>(batch.return_width())};
+}
+
+void Append(absl::Span<const float> values, int, Column* column) {
   const int old_size = column->size();
   column->Resize(old_size + static_cast<int>(values.size()), 0.0f);
   std::copy(values.begin(), values.end(), column->mutable_data() + old_size);
+}
+void Append(float value, int width, Column* column) {
+  if (width > 0) column->Add(value);
 }
 
 template <class Matrix>
@@ -56,14 +67,13 @@ absl::Status CheckShape(const TransitionBatch& batch, const TransitionLayout& la
         absl::StrCat("count: expected at most ", kMaxRows, ", found ", batch.count()));
   }
   const int n = static_cast<int>(batch.count());
-  RETURN_IF_ERROR(CheckColumn("observations", batch.observations(), n, layout.observation_width));
-  RETURN_IF_ERROR(CheckColumn("actions", batch.actions(), n, layout.action_width));
-  RETURN_IF_ERROR(CheckColumn("masks", batch.masks(), n, layout.mask_width));
-  RETURN_IF_ERROR(CheckColumn("rewards", batch.rewards(), n, 1));
-  RETURN_IF_ERROR(CheckColumn("discounts", batch.discounts(), n, 1));
-  RETURN_IF_ERROR(CheckColumn("returns", batch.returns(), n, layout.return_width));
-  RETURN_IF_ERROR(CheckColumn("next_observations", batch.next_observations(), n, layout.observation_width));
-  RETURN_IF_ERROR(CheckColumn("next_masks", batch.next_masks(), n, layout.mask_width));
+  absl::Status status;
+  ForEachColumn(
+      [&status, n](const ColumnPlace& place, const Column* column) {
+        if (status.ok()) status = CheckColumn(place.name, *column, n, place.width);
+      },
+      layout.columns(), ColumnsIn(batch));
+  RETURN_IF_ERROR(status);
   if (!batch.advantages().empty()) RETURN_IF_ERROR(CheckColumn("advantages", batch.advantages(), n, 1));
   if (!batch.critic_versions().empty() && batch.critic_versions_size() != n) {
     return absl::InvalidArgumentError(absl::StrCat("column 'critic_versions': expected ", n,
@@ -74,14 +84,9 @@ absl::Status CheckShape(const TransitionBatch& batch, const TransitionLayout& la
 
 void AppendTransition(const TransitionView& transition, float advantage, std::uint64_t critic_version,
                       TransitionBatch* batch) {
-  Append(transition.observation, batch->mutable_observations());
-  Append(transition.action, batch->mutable_actions());
-  Append(transition.mask, batch->mutable_masks());
-  batch->add_rewards(transition.reward);
-  batch->add_discounts(transition.discount);
-  if (batch->return_width() > 0) batch->add_returns(transition.monte_carlo_return);
-  Append(transition.next_observation, batch->mutable_next_observations());
-  Append(transition.next_mask, batch->mutable_next_masks());
+  ForEachColumn([](const ColumnPlace& place, const auto* value,
+                   Column* column) { Append(*value, place.width, column); },
+                LayoutOf(*batch).columns(), ValuesOf(transition), ColumnsIn(batch));
   batch->add_advantages(advantage);
   batch->add_critic_versions(critic_version);
   batch->set_count(batch->count() + 1);
@@ -90,14 +95,8 @@ void AppendTransition(const TransitionView& transition, float advantage, std::ui
 absl::Status Decode(const TransitionBatch& batch, const TransitionLayout& layout, Batch* out) {
   RETURN_IF_ERROR(CheckShape(batch, layout));
   out->Resize(layout, batch.count(), /*with_keys=*/false);
-  CopyColumn(batch.observations(), &out->observations);
-  CopyColumn(batch.actions(), &out->actions);
-  CopyColumn(batch.masks(), &out->masks);
-  CopyColumn(batch.rewards(), &out->rewards);
-  CopyColumn(batch.discounts(), &out->discounts);
-  CopyColumn(batch.returns(), &out->returns);
-  CopyColumn(batch.next_observations(), &out->next_observations);
-  CopyColumn(batch.next_masks(), &out->next_masks);
+  ForEachColumn([](const Column* column, auto& matrix) { CopyColumn(*column, &matrix); }, ColumnsIn(batch),
+                *out);
   return absl::OkStatus();
 }
 

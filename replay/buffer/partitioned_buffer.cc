@@ -159,24 +159,18 @@ absl::Status PartitionedBuffer::Insert(std::uint32_t place, InsertBatch* batch, 
 
 void PartitionedBuffer::DrawPart(int part, std::uint32_t count, const DrawColumns& out) {
   ChooseSlots(part, count);
-  const std::size_t observation = layout_.observation_width, action = layout_.action_width,
-                    mask = layout_.mask_width, monte_carlo = layout_.return_width;
-  const auto copy = [](const float* from, std::size_t width, std::size_t i, float* to) {
-    if (width > 0) std::memcpy(to + i * width, from, width * sizeof(float));
-  };
+  const ColumnSet<ColumnPlace> places = layout_.columns();
   constexpr std::size_t kAhead = 8;  // rows lie at random: ask for them before they are needed
   for (std::size_t i = 0; i < count; ++i) {
     if (i + kAhead < count) __builtin_prefetch(store_->row(drawn_slots_[i + kAhead]));
     const float* row = store_->row(drawn_slots_[i]);
     out.keys[i] = store_->KeyAt(drawn_slots_[i]);
-    copy(row, observation, i, out.observations);
-    copy(row + layout_.action_offset(), action, i, out.actions);
-    copy(row + layout_.mask_offset(), mask, i, out.masks);
-    out.rewards[i] = row[layout_.reward_offset()];
-    out.discounts[i] = row[layout_.discount_offset()];
-    copy(row + layout_.return_offset(), monte_carlo, i, out.returns);
-    copy(row + layout_.next_observation_offset(), observation, i, out.next_observations);
-    copy(row + layout_.next_mask_offset(), mask, i, out.next_masks);
+    ForEachColumn(
+        [row, i](const ColumnPlace& place, float* column) {
+          const auto width = static_cast<std::size_t>(place.width);
+          if (width > 0) std::memcpy(column + i * width, row + place.offset, width * sizeof(float));
+        },
+        places, out);
   }
 }
 

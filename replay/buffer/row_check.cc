@@ -24,23 +24,23 @@ bool IsAction(float action, int actions) {
 
 bool RowIsGood(const TransitionLayout& layout, const InsertColumns& columns, int i) {
   const TransitionView row = columns.Row(layout, i);
-  return AllFinite(row.observation) && AllFinite(row.action) && AllFinite(row.mask) &&
-         AllFinite({&row.reward, 1}) && AllFinite({&row.discount, 1}) &&
-         (layout.return_width == 0 || AllFinite({&row.monte_carlo_return, 1})) &&
-         AllFinite(row.next_observation) && AllFinite(row.next_mask) && !std::isinf(columns.Advantage(i)) &&
-         (layout.mask_width == 0 || IsAction(row.action[0], layout.mask_width));
+  bool good = !std::isinf(columns.Advantage(i)) &&
+              (layout.mask_width == 0 || IsAction(row.action[0], layout.mask_width));
+  ForEachColumn([&good](const ColumnPlace& place,
+                        const auto* value) { good = good && AllFinite(FloatsOf(*value, place.width)); },
+                layout.columns(), ValuesOf(row));
+  return good;
 }
 
 bool AllGood(const TransitionLayout& layout, const InsertColumns& c) {
   const std::size_t n = static_cast<std::size_t>(c.count);
-  if (!AllFinite({c.observations, n * layout.observation_width}) ||
-      !AllFinite({c.actions, n * layout.action_width}) || !AllFinite({c.masks, n * layout.mask_width}) ||
-      !AllFinite({c.rewards, n}) || !AllFinite({c.discounts, n}) ||
-      !AllFinite({c.returns, n * layout.return_width}) ||
-      !AllFinite({c.next_observations, n * layout.observation_width}) ||
-      !AllFinite({c.next_masks, n * layout.mask_width})) {
-    return false;
-  }
+  bool finite = true;
+  ForEachColumn(
+      [&finite, n](const ColumnPlace& place, const float* column) {
+        finite = finite && AllFinite({column, n * static_cast<std::size_t>(place.width)});
+      },
+      layout.columns(), c);
+  if (!finite) return false;
   for (int i = 0; i < c.count; ++i) {
     if (std::isinf(c.Advantage(i))) return false;
     if (layout.mask_width > 0 &&

@@ -34,18 +34,16 @@ std::size_t RowsPerMessage(const WriterOptions& options) {
   return std::max<std::size_t>(rows, 1);
 }
 
-absl::Status CheckWidth(const char* what, int expected, std::size_t found) {
-  if (static_cast<std::size_t>(expected) == found) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(what, ": expected ", expected, " values, found ", found));
-}
-
 absl::Status CheckWidths(const TransitionLayout& layout, const TransitionView& transition) {
-  RETURN_IF_ERROR(CheckWidth("observation", layout.observation_width, transition.observation.size()));
-  RETURN_IF_ERROR(CheckWidth("action", layout.action_width, transition.action.size()));
-  RETURN_IF_ERROR(CheckWidth("mask", layout.mask_width, transition.mask.size()));
-  RETURN_IF_ERROR(
-      CheckWidth("next_observation", layout.observation_width, transition.next_observation.size()));
-  return CheckWidth("next_mask", layout.mask_width, transition.next_mask.size());
+  absl::Status status;
+  const auto check = [&status](const ColumnPlace& place, const auto* value) {
+    const std::size_t found = FloatsOf(*value, place.width).size();
+    if (!status.ok() || found == static_cast<std::size_t>(place.width)) return;
+    status = absl::InvalidArgumentError(
+        absl::StrCat(place.value, ": expected ", place.width, " values, found ", found));
+  };
+  ForEachColumn(check, layout.columns(), ValuesOf(transition));
+  return status;
 }
 
 }  // namespace

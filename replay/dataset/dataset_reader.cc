@@ -151,12 +151,14 @@ void DatasetReader::State::Take(const Step& step, TransitionChunk* chunk) {
 }
 
 void DatasetReader::State::Write(const Step& step, TransitionChunk* chunk) const {
-  float* const row = chunk->row(chunk->size);
-  std::copy_n(step.observation, layout.observation_width, row);
-  std::copy_n(step.action, layout.action_width, row + layout.action_offset());
-  row[layout.reward_offset()] = step.reward;
-  row[layout.discount_offset()] = step.end == StepEnd::kTerminal ? 0 : options.discount;
-  std::copy_n(step.next_observation, layout.observation_width, row + layout.next_observation_offset());
+  const auto observation = static_cast<std::size_t>(layout.observation_width),
+             action = static_cast<std::size_t>(layout.action_width);
+  WriteRow({.observation = {step.observation, observation},
+            .action = {step.action, action},
+            .reward = step.reward,
+            .discount = step.end == StepEnd::kTerminal ? 0 : options.discount,
+            .next_observation = {step.next_observation, observation}},
+           layout, chunk->row(chunk->size));
 }
 
 // The transition at chunk->size may be its episode's last.

@@ -26,17 +26,25 @@ Value* Room(std::size_t size, google::protobuf::RepeatedField<Value>* field) {
 }
 
 DrawColumns RoomForPart(std::size_t count, const TransitionLayout& layout, SampledPart* part) {
-  TransitionBatch* batch = part->mutable_transitions();
-  const std::size_t observation = count * layout.observation_width, mask = count * layout.mask_width;
-  return {.keys = Room(count, part->mutable_keys()),
-          .observations = Room(observation, batch->mutable_observations()),
-          .actions = Room(count * layout.action_width, batch->mutable_actions()),
-          .masks = Room(mask, batch->mutable_masks()),
-          .rewards = Room(count, batch->mutable_rewards()),
-          .discounts = Room(count, batch->mutable_discounts()),
-          .returns = Room(count * layout.return_width, batch->mutable_returns()),
-          .next_observations = Room(observation, batch->mutable_next_observations()),
-          .next_masks = Room(mask, batch->mutable_next_masks())};
+  DrawColumns room;
+  room.keys = Room(count, part->mutable_keys());
+  ForEachColumn(
+      [count](const ColumnPlace& place, auto* field, float*& column) {
+        column = Room(count * static_cast<std::size_t>(place.width), field);
+      },
+      layout.columns(), ColumnsIn(part->mutable_transitions()), room);
+  return room;
+}
+
+// Views into `batch`, which has passed CheckShape.
+InsertColumns ViewColumns(const TransitionBatch& batch) {
+  InsertColumns columns;
+  columns.count = static_cast<int>(batch.count());
+  ForEachColumn([](const auto* field, const float*& column) { column = field->data(); }, ColumnsIn(batch),
+                columns);
+  columns.advantages = batch.advantages().empty() ? nullptr : batch.advantages().data();
+  columns.critic_versions = batch.critic_versions().empty() ? nullptr : batch.critic_versions().data();
+  return columns;
 }
 
 void EncodeWriter(const WriterSummary& summary, WriterStats* writer) {
@@ -113,18 +121,7 @@ absl::StatusOr<InsertBatch> DecodeInsert(const InsertRequest& request, const Tra
   InsertBatch decoded;
   decoded.first_sequence = request.first_sequence();
   decoded.ends = *ends;
-  decoded.columns = {
-      .count = static_cast<int>(batch.count()),
-      .observations = batch.observations().data(),
-      .actions = batch.actions().data(),
-      .masks = batch.masks().data(),
-      .rewards = batch.rewards().data(),
-      .discounts = batch.discounts().data(),
-      .returns = batch.returns().data(),
-      .next_observations = batch.next_observations().data(),
-      .next_masks = batch.next_masks().data(),
-      .advantages = batch.advantages().empty() ? nullptr : batch.advantages().data(),
-      .critic_versions = batch.critic_versions().empty() ? nullptr : batch.critic_versions().data()};
+  decoded.columns = ViewColumns(batch);
   return decoded;
 }
 

@@ -29,45 +29,37 @@ constexpr int kBatch = 256;
 constexpr absl::Duration kTimeout = absl::Seconds(60);
 
 // `count` rows of zeros, ones and advantages of either sign.
-struct Columns {
-  explicit Columns(int count)
-      : observations(static_cast<std::size_t>(count) * kLayout.observation_width),
-        actions(count),
-        masks(static_cast<std::size_t>(count) * kLayout.mask_width, 1.0f),
-        rewards(count),
-        discounts(count, 0.99f),
-        advantages(count),
-        versions(count, 1),
-        keys(count) {
+struct Columns : ColumnSet<std::vector<float>> {
+  explicit Columns(int count) : advantages(count), versions(count, 1), keys(count) {
+    ForEachColumn(
+        [count](const ColumnPlace& place, auto& column) {
+          column.assign(static_cast<std::size_t>(count) * place.width, 1.0f);
+        },
+        kLayout.columns(), *this);
     Rng rng(1);
     for (float& value : observations) value = static_cast<float>(rng.Below(2));
+    next_observations = observations;
+    actions.assign(actions.size(), 0.0f);
+    rewards.assign(rewards.size(), 0.0f);
+    discounts.assign(discounts.size(), 0.99f);
     for (float& value : advantages) value = static_cast<float>(rng.Normal());
   }
   InsertColumns insert() const {
-    return {.count = static_cast<int>(rewards.size()),
-            .observations = observations.data(),
-            .actions = actions.data(),
-            .masks = masks.data(),
-            .rewards = rewards.data(),
-            .discounts = discounts.data(),
-            .next_observations = observations.data(),
-            .next_masks = masks.data(),
-            .advantages = advantages.data(),
-            .critic_versions = versions.data()};
+    InsertColumns views;
+    views.count = static_cast<int>(rewards.size());
+    ForEachColumn([](const auto& from, const float*& to) { to = from.data(); }, *this, views);
+    views.advantages = advantages.data();
+    views.critic_versions = versions.data();
+    return views;
   }
   DrawColumns draw() {
-    return {.keys = keys.data(),
-            .observations = observations.data(),
-            .actions = actions.data(),
-            .masks = masks.data(),
-            .rewards = rewards.data(),
-            .discounts = discounts.data(),
-            .next_observations = next_observations.data(),
-            .next_masks = next_masks.data()};
+    DrawColumns room;
+    room.keys = keys.data();
+    ForEachColumn([](auto& from, float*& to) { to = from.data(); }, *this, room);
+    return room;
   }
-  std::vector<float> observations, actions, masks, rewards, discounts, advantages;
+  std::vector<float> advantages;
   std::vector<std::uint64_t> versions, keys;
-  std::vector<float> next_observations = observations, next_masks = masks;
 };
 
 // A full buffer in memory.
@@ -111,8 +103,6 @@ BENCHMARK(BufferInsert);
 void BufferSample(benchmark::State& state) {
   FullBuffer full;
   Columns columns(kBatch);
-  columns.next_observations = columns.observations;
-  columns.next_masks = columns.masks;
   const DrawBuffers out = {columns.draw(), {}, {}};
   DrawResult result;
   for (auto _ : state) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/columns.h"
 #include "core/transition.h"
 #include "replay/buffer/buffer_types.h"
 
@@ -17,7 +18,7 @@ inline constexpr TransitionLayout kLayoutWithReturns{
     .observation_width = 4, .action_width = 1, .mask_width = 3, .return_width = 1};
 
 // Columns of transitions first, first + 1, ...: every value of transition i follows from i.
-class Rows {
+class Rows : public ColumnSet<std::vector<float>> {
  public:
   Rows(const TransitionLayout& layout, std::uint64_t first, int count, float advantage = kUnjudged)
       : layout_(layout) {
@@ -28,32 +29,21 @@ class Rows {
   static float Value(std::uint64_t i) { return static_cast<float>(i % 100000); }
 
   InsertColumns columns() const {
-    return {.count = static_cast<int>(rewards.size()),
-            .observations = observations.data(),
-            .actions = actions.data(),
-            .masks = masks.data(),
-            .rewards = rewards.data(),
-            .discounts = discounts.data(),
-            .returns = returns.data(),
-            .next_observations = next_observations.data(),
-            .next_masks = next_masks.data(),
-            .advantages = advantages.data(),
-            .critic_versions = critic_versions.data()};
+    InsertColumns views;
+    views.count = static_cast<int>(rewards.size());
+    ForEachColumn([](const auto& from, const float*& to) { to = from.data(); }, *this, views);
+    views.advantages = advantages.data();
+    views.critic_versions = critic_versions.data();
+    return views;
   }
 
   // Row i as it lies in a store.
   void AppendFlat(int i, std::vector<float>* flat) const {
-    const TransitionView row = columns().Row(layout_, i);
-    for (const auto& part : {row.observation, row.action, row.mask})
-      flat->insert(flat->end(), part.begin(), part.end());
-    flat->insert(flat->end(), {row.reward, row.discount});
-    if (layout_.return_width > 0) flat->push_back(row.monte_carlo_return);
-    for (const auto& part : {row.next_observation, row.next_mask})
-      flat->insert(flat->end(), part.begin(), part.end());
+    flat->resize(flat->size() + static_cast<std::size_t>(layout_.stride()));
+    WriteRow(columns().Row(layout_, i), layout_, flat->data() + flat->size() - layout_.stride());
   }
 
-  std::vector<float> observations, actions, masks, rewards, discounts, returns, next_observations, next_masks,
-      advantages;
+  std::vector<float> advantages;
   std::vector<std::uint64_t> critic_versions;
 
  private:
@@ -80,55 +70,33 @@ class Rows {
 };
 
 // Memory for a draw, and a check that each drawn row is one transition from end to end.
-class Drawn {
+class Drawn : public ColumnSet<std::vector<float>> {
  public:
-  Drawn(const TransitionLayout& layout, std::size_t count)
-      : keys(count),
-        observations(count * layout.observation_width),
-        actions(count * layout.action_width),
-        masks(count * layout.mask_width),
-        rewards(count),
-        discounts(count),
-        returns(count * layout.return_width),
-        next_observations(count * layout.observation_width),
-        next_masks(count * layout.mask_width),
-        layout_(layout) {}
+  Drawn(const TransitionLayout& layout, std::size_t count) : keys(count), layout_(layout) {
+    ForEachColumn([count](const ColumnPlace& place, auto& column) { column.resize(count * place.width); },
+                  layout.columns(), *this);
+  }
 
   DrawColumns columns() {
-    return {.keys = keys.data(),
-            .observations = observations.data(),
-            .actions = actions.data(),
-            .masks = masks.data(),
-            .rewards = rewards.data(),
-            .discounts = discounts.data(),
-            .returns = returns.data(),
-            .next_observations = next_observations.data(),
-            .next_masks = next_masks.data()};
+    DrawColumns room;
+    room.keys = keys.data();
+    ForEachColumn([](auto& from, float*& to) { to = from.data(); }, *this, room);
+    return room;
   }
 
   void ExpectWhole(std::size_t count) const {
     for (std::size_t i = 0; i < count; ++i) {
       const Rows expected(layout_, static_cast<std::uint64_t>(rewards[i]), 1);
-      for (int k = 0; k < layout_.observation_width; ++k) {
-        ASSERT_EQ(observations[i * layout_.observation_width + k], expected.observations[k]);
-        ASSERT_EQ(next_observations[i * layout_.observation_width + k], expected.next_observations[k]);
-      }
-      for (int k = 0; k < layout_.action_width; ++k) {
-        ASSERT_EQ(actions[i * layout_.action_width + k], expected.actions[k]);
-      }
-      for (int k = 0; k < layout_.mask_width; ++k) {
-        ASSERT_EQ(masks[i * layout_.mask_width + k], expected.masks[k]);
-        ASSERT_EQ(next_masks[i * layout_.mask_width + k], expected.next_masks[k]);
-      }
-      ASSERT_EQ(discounts[i], 0.5f);
-      if (layout_.return_width > 0) {
-        ASSERT_EQ(returns[i], expected.returns[0]);
-      }
+      ForEachColumn(
+          [i](const ColumnPlace& place, const auto& found, const auto& wanted) {
+            for (int k = 0; k < place.width; ++k)
+              ASSERT_EQ(found[i * place.width + k], wanted[k]) << place.name;
+          },
+          layout_.columns(), *this, expected);
     }
   }
 
   std::vector<std::uint64_t> keys;
-  std::vector<float> observations, actions, masks, rewards, discounts, returns, next_observations, next_masks;
 
  private:
   TransitionLayout layout_;
