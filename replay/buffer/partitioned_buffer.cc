@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <utility>
 
@@ -45,34 +44,24 @@ absl::Status CheckCount(const char* what, std::uint64_t found, std::uint64_t max
 absl::StatusOr<std::unique_ptr<PartitionedBuffer>> PartitionedBuffer::Make(
     std::unique_ptr<TransitionStore> store, const BufferOptions& options) {
   ASSIGN_OR_RETURN(const RateLimiter limiter, RateLimiter::Make(options.limiter, store->capacity()));
-  Partitions partitions(static_cast<std::uint32_t>(store->capacity()));
-  for (std::uint64_t rank = 0; rank < store->size(); ++rank) {
-    const std::uint32_t slot = store->SlotOf(store->KeyAtRank(rank));
-    partitions.Add(slot, store->labels(slot).advantage, store->labels(slot).source);
-  }
-  return std::unique_ptr<PartitionedBuffer>(
-      new PartitionedBuffer(std::move(store), options, limiter, std::move(partitions)));
+  return std::unique_ptr<PartitionedBuffer>(new PartitionedBuffer(std::move(store), options, limiter));
 }
 
 PartitionedBuffer::PartitionedBuffer(std::unique_ptr<TransitionStore> store, const BufferOptions& options,
-                                     const RateLimiter& limiter, Partitions partitions)
+                                     const RateLimiter& limiter)
     : layout_(store->layout()),
       capacity_(store->capacity()),
       cumulative_advantage_(options.cumulative_advantage),
-      seed_buffer_share_(options.seed_buffer_share),
       now_(options.now),
-      start_(options.now()),
       store_(std::move(store)),
-      partitions_(std::move(partitions)),
-      limiter_(limiter),
-      rng_(options.seed),
-      inserts_(start_),
-      draws_(start_),
-      relabels_(start_) {}
+      rows_(store_.get()),
+      admission_(limiter, store_.get(), &rows_.partitions()),
+      drawer_(options.seed_buffer_share, options.seed, store_.get(), &rows_.partitions()),
+      statistics_(options.now(), store_.get(), &rows_.partitions()) {}
 
 absl::StatusOr<std::uint32_t> PartitionedBuffer::OpenWriter(const WriterIdentity& identity) {
   absl::MutexLock lock(&mutex_);
-  if (closed_) return absl::UnavailableError("the replay server is stopping");
+  RETURN_IF_ERROR(admission_.CheckOpen());
   return store_->writers().Open(identity);
 }
 
@@ -105,33 +94,6 @@ bool PartitionedBuffer::SkipRows(std::uint32_t place, const std::vector<bool>& r
   return false;
 }
 
-void PartitionedBuffer::Evict() {
-  const std::uint32_t slot = store_->SlotOf(store_->oldest_key());
-  const RowLabels& labels = store_->labels(slot);
-  partitions_.Remove(slot, labels.advantage, labels.source);
-  store_->writers().AddHeld(labels.writer, -1);
-  store_->Evict();
-}
-
-void PartitionedBuffer::InsertRow(std::uint32_t place, const InsertBatch& batch) {
-  if (store_->size() == capacity_) Evict();
-  const int row = batch.next_row;
-  WriterRecord& writer = store_->writers().record(place);
-  RowLabels labels{.sequence = batch.first_sequence + static_cast<std::uint64_t>(row),
-                   .critic_version = batch.columns.CriticVersion(row),
-                   .advantage = batch.columns.Advantage(row),
-                   .writer = place,
-                   .source = writer.source};
-  const std::uint32_t slot = store_->Append(batch.columns.Row(layout_, row), labels);
-  partitions_.Add(slot, labels.advantage, labels.source);
-  store_->writers().AddHeld(place, 1);
-  writer.last_sequence = labels.sequence;
-  ++writer.inserted;
-  if (!std::isnan(labels.advantage)) {
-    store_->counters().newest_label = std::max(store_->counters().newest_label, labels.critic_version);
-  }
-}
-
 absl::Status PartitionedBuffer::Insert(std::uint32_t place, InsertBatch* batch, absl::Time deadline) {
   RETURN_IF_ERROR(CheckBatch(*batch));
   const std::vector<bool> refused = RefusedRows(layout_, batch->columns);
@@ -140,38 +102,44 @@ absl::Status PartitionedBuffer::Insert(std::uint32_t place, InsertBatch* batch, 
                               [](const RowEnd& e, int row) { return e.row < row; });
   while (batch->next_row < batch->columns.count) {
     absl::MutexLock lock(&mutex_);
-    RETURN_IF_ERROR(CheckHasPlace());
+    RETURN_IF_ERROR(rows_.CheckHasPlace());
     const std::uint64_t inserted_before = store_->inserted();
     for (int rows = 0; rows < kRowsPerLock && SkipRows(place, refused, batch); ++rows) {
-      if (rows > 0 && !CanInsert()) break;
-      if (rows == 0) RETURN_IF_ERROR(AwaitInsert(deadline));
+      if (rows > 0 && !admission_.CanInsert()) break;
+      if (rows == 0) RETURN_IF_ERROR(admission_.AwaitInsert(&mutex_, deadline));
       // While this one waited, another stream of the writer may have brought the same rows.
       if (rows == 0 && !SkipRows(place, refused, batch)) break;
-      InsertRow(place, *batch);
+      rows_.Insert(place, *batch);
       while (end != batch->ends.end() && end->row < batch->next_row) ++end;
       if (end != batch->ends.end() && end->row == batch->next_row) store_->CountEpisode(end->end);
       ++batch->next_row;
     }
-    inserts_.Add(now, store_->inserted() - inserted_before);
+    statistics_.CountInserted(now, store_->inserted() - inserted_before);
   }
   return absl::OkStatus();
 }
 
-void PartitionedBuffer::DrawPart(int part, std::uint32_t count, const DrawColumns& out) {
-  ChooseSlots(part, count);
-  const ColumnSet<ColumnPlace> places = layout_.columns();
-  constexpr std::size_t kAhead = 8;  // rows lie at random: ask for them before they are needed
-  for (std::size_t i = 0; i < count; ++i) {
-    if (i + kAhead < count) __builtin_prefetch(store_->row(drawn_slots_[i + kAhead]));
-    const float* row = store_->row(drawn_slots_[i]);
-    out.keys[i] = store_->KeyAt(drawn_slots_[i]);
-    ForEachColumn(
-        [row, i](const ColumnPlace& place, float* column) {
-          const auto width = static_cast<std::size_t>(place.width);
-          if (width > 0) std::memcpy(column + i * width, row + place.offset, width * sizeof(float));
-        },
-        places, out);
+absl::Status PartitionedBuffer::CheckSeedBufferMayCome() const {
+  RETURN_IF_ERROR(admission_.CheckOpen());
+  return rows_.CheckSeedBufferMayCome();
+}
+
+absl::Status PartitionedBuffer::InsertSeedBuffer(absl::Span<const float> rows) {
+  const std::size_t stride = static_cast<std::size_t>(layout_.stride());
+  DBR_CHECK(rows.size() % stride == 0);
+  for (std::size_t from = 0; from < rows.size(); from += kSeedBufferRowsPerLock * stride) {
+    absl::MutexLock lock(&mutex_);
+    RETURN_IF_ERROR(CheckSeedBufferMayCome());
+    RETURN_IF_ERROR(rows_.AppendSeedBuffer(rows.subspan(from, kSeedBufferRowsPerLock * stride)));
   }
+  return absl::OkStatus();
+}
+
+absl::Status PartitionedBuffer::CompleteSeedBuffer(const SeedBufferRecord& record, bool pin) {
+  absl::MutexLock lock(&mutex_);
+  RETURN_IF_ERROR(CheckSeedBufferMayCome());
+  store_->CompleteSeedBuffer(record, pin);
+  return absl::OkStatus();
 }
 
 absl::Status PartitionedBuffer::Draw(const DrawRequest& request, const DrawBuffers& out, absl::Time deadline,
@@ -182,21 +150,22 @@ absl::Status PartitionedBuffer::Draw(const DrawRequest& request, const DrawBuffe
     return absl::InvalidArgumentError("sample: expected at least one transition to draw, found 0");
   RETURN_IF_ERROR(CheckCount("sample: transitions to draw", asked, kMaxDraws));
   absl::MutexLock lock(&mutex_);
-  result->raised_tolerance = limiter_.MakeRoomFor(asked) ? limiter_.options().tolerance : 0;
-  RETURN_IF_ERROR(AwaitDraw(request, deadline));
+  result->raised_tolerance = admission_.MakeRoomFor(asked);
+  RETURN_IF_ERROR(admission_.AwaitDraw(&mutex_, request, deadline));
+  const Partitions& partitions = rows_.partitions();
   std::uint64_t drawn = 0;
   for (int part = 0; part < kDrawnParts; ++part) {
-    result->drawn[part] = partitions_.size(part) > 0 ? request.counts[part] : 0;
-    DrawPart(part, result->drawn[part], out[part]);
+    result->drawn[part] = partitions.size(part) > 0 ? request.counts[part] : 0;
+    drawer_.Draw(part, result->drawn[part], out[part]);
     drawn += result->drawn[part];
   }
   store_->counters().sampled += drawn;
   if (store_->online_inserted() == 0) store_->counters().sampled_offline += drawn;
-  draws_.Add(now_(), drawn);
-  result->total = partitions_.size(kAll);
-  result->plus = partitions_.size(kPlus);
-  result->minus = partitions_.size(kMinus);
-  result->unjudged = partitions_.size(kUnjudgedPart);
+  statistics_.CountDrawn(now_(), drawn);
+  result->total = partitions.size(kAll);
+  result->plus = partitions.size(kPlus);
+  result->minus = partitions.size(kMinus);
+  result->unjudged = partitions.size(kUnjudgedPart);
   result->inserted = store_->online_inserted();
   result->episodes = store_->counters().episodes;
   return absl::OkStatus();
@@ -233,22 +202,35 @@ absl::StatusOr<RelabelResult> PartitionedBuffer::Relabel(std::uint64_t version,
   counters.relabel_stale += result.stale;
   counters.relabel_refused += result.refused;
   if (result.relabelled > 0) counters.newest_label = std::max(counters.newest_label, version);
-  relabels_.Add(now, result.relabelled);
+  statistics_.CountRelabelled(now, result.relabelled);
   return result;
 }
 
 void PartitionedBuffer::RelabelRow(std::uint32_t slot, std::uint64_t version, float advantage) {
-  const RowLabels before = store_->labels(slot);
-  if (cumulative_advantage_ && before.advantage > 0)
-    advantage += before.advantage;  // not yet judged (NaN): nothing to add
+  const float before = store_->labels(slot).advantage;
+  if (cumulative_advantage_ && before > 0) advantage += before;  // not yet judged (NaN): nothing to add
   if (std::isinf(advantage)) advantage = std::numeric_limits<float>::max();
-  store_->SetAdvantage(slot, advantage, version);
-  partitions_.Relabel(slot, before.advantage, advantage, before.source);
+  rows_.Relabel(slot, version, advantage);
+}
+
+BufferStats PartitionedBuffer::Stats() const {
+  LabelSurvey survey(kLabelsLookedAt);
+  for (bool more = true; more;) {
+    absl::MutexLock lock(&mutex_);
+    more = survey.LookOn(*store_);
+  }
+  LabelSummary labels = survey.Summarize();
+  const absl::Time now = now_();
+  absl::MutexLock lock(&mutex_);
+  BufferStats stats = statistics_.Gather(now);
+  stats.labels = std::move(labels);
+  stats.blocked = admission_.Blocked();
+  return stats;
 }
 
 void PartitionedBuffer::Close() {
   absl::MutexLock lock(&mutex_);
-  closed_ = true;
+  admission_.Close();
 }
 
 // Without the lock: it reads nothing but where the mapping lies, and waits for the disk.

@@ -1,10 +1,10 @@
-// The replay buffer: D with its partitions D+ (advantage >= 0), D- (advantage <= 0) and the rows not yet
-// judged.
+// The replay buffer: D with its partitions D+ (advantage >= 0), D- (advantage <= 0) and the rows that no
+// critic has judged yet.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "absl/base/thread_annotations.h"
@@ -13,19 +13,27 @@
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 #include "absl/types/span.h"
-#include "core/rng.h"
+#include "replay/buffer/admission.h"
+#include "replay/buffer/buffer_statistics.h"
 #include "replay/buffer/buffer_stats.h"
 #include "replay/buffer/buffer_types.h"
-#include "replay/buffer/partitions.h"
+#include "replay/buffer/partitioned_rows.h"
 #include "replay/buffer/rate_limiter.h"
-#include "replay/buffer/rate_window.h"
+#include "replay/buffer/row_drawer.h"
 #include "replay/store/transition_store.h"
 
 namespace dbr {
 
-// Thread-safe behind one lock, which it holds for at most kRowsPerLock inserted rows, one draw or one
-// relabel. Rows are evicted first in, first out; a seed buffer may be pinned, and then the oldest of the
-// others goes. An advantage of 0 lies in D+ and in D-.
+// The calls of the replay, under the one lock of the server:
+//
+//   Insert, InsertSeedBuffer, Relabel ---> PartitionedRows    the rows and their partitions, kept in step
+//   Insert, Draw (wait) -----------------> Admission          the rate limiter and who waits
+//   Draw --------------------------------> RowDrawer          random rows
+//   Stats -------------------------------> BufferStatistics   counts and rates
+//
+// Thread-safe. The lock is held for at most kRowsPerLock inserted rows, one draw or one relabel. Rows are
+// evicted first in, first out; a seed buffer may be pinned, and then the oldest of the others goes. An
+// advantage of 0 lies in D+ and in D-.
 class PartitionedBuffer {
  public:
   static constexpr int kRowsPerLock = 256;
@@ -83,58 +91,26 @@ class PartitionedBuffer {
 
  private:
   PartitionedBuffer(std::unique_ptr<TransitionStore> store, const BufferOptions& options,
-                    const RateLimiter& limiter, Partitions partitions);
+                    const RateLimiter& limiter);
 
-  // Calls that wait.
-  struct Waiting {
-    std::uint64_t inserts = 0, draws = 0, draws_of_plus = 0, draws_of_minus = 0;
-    DrawRequest newest_draw;
-  };
-
-  absl::Status CheckHasPlace() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::Status CheckSeedBufferMayCome() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  // Fills drawn_slots_.
-  void ChooseSlots(int part, std::uint32_t count) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  RateLimiter::Counts Counts() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  bool CanInsert() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  bool CanDraw(const DrawRequest& request) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  std::uint64_t EffectiveDraws(const DrawRequest& request) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  std::string WhyDrawWaits(const DrawRequest& request) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::Status AwaitInsert(absl::Time deadline) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  absl::Status AwaitDraw(const DrawRequest& request, absl::Time deadline)
-      ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Drops or refuses the next rows where they are not to be stored; false where none is left.
   bool SkipRows(std::uint32_t place, const std::vector<bool>& refused, InsertBatch* batch)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void InsertRow(std::uint32_t place, const InsertBatch& batch) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
+  absl::Status CheckSeedBufferMayCome() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   void RelabelRow(std::uint32_t slot, std::uint64_t version, float advantage)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void Evict() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void DrawPart(int part, std::uint32_t count, const DrawColumns& out) ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void AddCounts(BufferStats* stats) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void AddWriters(BufferStats* stats) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void AddBlocked(BufferStats* stats) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  void AddEpisodes(BufferStats* stats) const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
-  LabelSummary LookAtLabels() const ABSL_LOCKS_EXCLUDED(mutex_);
 
   const TransitionLayout layout_;
   const std::uint64_t capacity_;
   const bool cumulative_advantage_;
-  const double seed_buffer_share_;
   const std::function<absl::Time()> now_;
-  const absl::Time start_;
 
   mutable absl::Mutex mutex_;
   const std::unique_ptr<TransitionStore> store_ ABSL_PT_GUARDED_BY(mutex_);
-  Partitions partitions_ ABSL_GUARDED_BY(mutex_);
-  RateLimiter limiter_ ABSL_GUARDED_BY(mutex_);
-  Rng rng_ ABSL_GUARDED_BY(mutex_);
-  std::vector<std::uint32_t> drawn_slots_ ABSL_GUARDED_BY(mutex_);
-  Waiting waiting_ ABSL_GUARDED_BY(mutex_);
-  RateWindow inserts_ ABSL_GUARDED_BY(mutex_);
-  RateWindow draws_ ABSL_GUARDED_BY(mutex_);
-  RateWindow relabels_ ABSL_GUARDED_BY(mutex_);
-  bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+  PartitionedRows rows_ ABSL_GUARDED_BY(mutex_);
+  Admission admission_ ABSL_GUARDED_BY(mutex_);
+  RowDrawer drawer_ ABSL_GUARDED_BY(mutex_);
+  BufferStatistics statistics_ ABSL_GUARDED_BY(mutex_);
 };
 
 }  // namespace dbr
