@@ -12,7 +12,8 @@
 
 namespace dbr {
 
-// Any number of producers and consumers. Close() wakes everybody; what is still queued can be taken.
+// A first-in, first-out queue for any number of producers and consumers. Thread-safe. Close() wakes
+// everybody; what is still queued can be taken.
 template <class T>
 class BoundedQueue {
  public:
@@ -43,6 +44,7 @@ class BoundedQueue {
     items_.pop_front();
     return value;
   }
+  // Ends all waits and refuses later items.
   void Close() {
     absl::MutexLock lock(&mutex_);
     closed_ = true;

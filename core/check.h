@@ -1,4 +1,5 @@
-// CHECK: for programmers' mistakes alone; what input, network or disk can cause is an absl::Status.
+// DBR_CHECK(condition) prints the condition and aborts where it is false. It is for programmers' mistakes
+// alone: what input, network or disk can cause is an absl::Status.
 #pragma once
 
 #include <cstdio>

@@ -1,4 +1,4 @@
-// Files that are whole or not there.
+// Reading and writing whole files. Free functions without state, for any thread.
 #pragma once
 
 #include <string>
@@ -9,12 +9,13 @@
 
 namespace dbr {
 
-// Replaces `path` by `contents`: writes a temporary file beside it, fsync, rename, fsync of the folder. After
-// a crash the old or the new contents stand there, never a mixture. Errors name the path and say what the
-// system said (ResourceExhausted: disk full; PermissionDenied; NotFound: no such folder; Internal: others).
+// Replaces `path` by `contents`: writes a temporary file beside it, calls fsync, renames it and calls fsync
+// on the folder. After a crash the old or the new contents stand there, never a mixture. Blocks. Errors name
+// the path and the system's reason (ResourceExhausted: disk full; PermissionDenied; NotFound: no such folder;
+// Internal: others).
 absl::Status WriteFileAtomically(const std::string& path, absl::string_view contents);
 
-// NotFound, PermissionDenied or Internal, with the path.
+// The whole of a file. NotFound, PermissionDenied or Internal, with the path. Blocks.
 absl::StatusOr<std::string> ReadFile(const std::string& path);
 
 // Turns errno into a status whose message is "WHAT PATH: strerror".

@@ -16,7 +16,7 @@ namespace dbr {
 struct PolicySpec {
   std::string env;
   std::string algorithm;
-  int observation_size = 0;
+  int observation_size = 0;  // floats
   ActionSpace actions;
   std::vector<int> hidden_sizes;
 
@@ -35,13 +35,14 @@ inline constexpr char kBehavior[] = "behavior";  // beta, fitted to all of the d
 // take observations as they are.
 inline constexpr char kObservationNormalizer[] = "observation_normalizer";
 
+// Plain values. A snapshot does not change once it is published: processes share it by pointer.
 struct PolicySnapshot {
   std::uint64_t version = 0;  // counts pushes, from 1
   std::uint64_t updates = 0;  // updates of the learner behind it
   PolicySpec spec;
   float support_epsilon = 0.05f;  // the eps of the acting mode SUPPORT
-  std::vector<std::pair<std::string, std::vector<float>>>
-      networks;  // name, flat parameters as nn::Mlp lays them
+  // Name and parameters of each network, flat as Mlp (nn/mlp.h) lays them.
+  std::vector<std::pair<std::string, std::vector<float>>> networks;
 
   // The parameters of a network, or null.
   const std::vector<float>* Find(absl::string_view name) const {
@@ -55,7 +56,7 @@ struct PolicySnapshot {
 // CRC-32C over the parameters of all networks, in order.
 std::uint32_t Checksum(const PolicySnapshot& snapshot);
 
-// InvalidArgument, naming each field that differs, if `found` is not a policy for what `expected` asks.
+// Checks that `found` is a policy for what `expected` asks. InvalidArgument names each field that differs.
 absl::Status CheckSameSpec(const PolicySpec& expected, const PolicySpec& found);
 
 }  // namespace dbr

@@ -1,4 +1,4 @@
-// Monte-Carlo returns of an episode's transitions, in flat rows.
+// Monte-Carlo returns of an episode's transitions, in flat rows. Free functions without state.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace dbr {
 
 // Writes the return of each of `rows` [T x stride], an unbroken stretch of one episode in its order:
 // R_t = r_t + discount_t * R_{t+1}, with R_T = `value_behind`, the value of the state behind the last row.
-// After a true terminal that does not count, for the discount is 0. Sums in double.
+// Behind a true terminal it does not count, for the discount is 0. Sums in double. O(T).
 inline void FillReturns(const TransitionLayout& layout, double value_behind, absl::Span<float> rows) {
   const std::size_t stride = static_cast<std::size_t>(layout.stride());
   DBR_CHECK(layout.return_width == 1 && rows.size() % stride == 0);
@@ -26,9 +26,9 @@ inline void FillReturns(const TransitionLayout& layout, double value_behind, abs
   }
 }
 
-// An estimate of the value behind a stretch that was cut, where there is no critic to ask: that the rewards
-// of its end go on for ever. The mean reward of the last min(T, 1 / (1 - discount)) rows, divided by 1 -
-// discount. Requires 0 <= discount < 1 and T >= 1.
+// Estimates the value behind a stretch `rows` [T x stride] that was cut, where there is no critic to ask: the
+// rewards of its end go on for ever. It is the mean reward of the last min(T, 1 / (1 - discount)) rows,
+// divided by 1 - discount. Requires 0 <= discount < 1 and T >= 1.
 inline double StationaryContinuation(const TransitionLayout& layout, double discount,
                                      absl::Span<const float> rows) {
   DBR_CHECK(discount >= 0 && discount < 1 && !rows.empty());

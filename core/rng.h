@@ -7,7 +7,8 @@
 
 namespace dbr {
 
-// One thread at a time. The same seed gives the same stream on every machine; the state can be saved.
+// A stream of random numbers. The same seed gives the same stream on every machine; the state can be saved.
+// Thread-compatible: one thread at a time.
 class Rng {
  public:
   using result_type = std::uint64_t;
@@ -44,7 +45,7 @@ class Rng {
   }
   // Uniform in [0, 1).
   double Uniform() { return static_cast<double>((*this)() >> 11) * 0x1.0p-53; }
-  // Standard normal, by Box and Muller; two draws each.
+  // Standard normal, by Box and Muller; takes two numbers of the stream each.
   double Normal() {
     const double radius = std::sqrt(-2.0 * std::log(1.0 - Uniform()));
     return radius * std::cos(6.283185307179586477 * Uniform());

@@ -1,4 +1,4 @@
-// Where everything of a run lies in its folder.
+// The files of a run, by their places in its folder.
 #pragma once
 
 #include <string>
@@ -8,18 +8,19 @@
 
 namespace dbr {
 
+// Gives paths; touches no file. Plain values.
 struct RunFolder {
-  std::string root;
+  std::string root;  // of the run
 
-  std::string config() const { return absl::StrCat(root, "/config.textproto"); }  // effective
+  // The effective config, with its defaults filled in.
+  std::string config() const { return absl::StrCat(root, "/config.textproto"); }
   std::string summary() const { return absl::StrCat(root, "/summary.json"); }
   std::string metrics() const { return absl::StrCat(root, "/metrics.jsonl"); }
   std::string checkpoints() const { return absl::StrCat(root, "/checkpoints"); }
   std::string policies() const { return absl::StrCat(root, "/policy"); }
   std::string latest_policy() const { return absl::StrCat(root, "/policy/latest.safetensors"); }
-  std::string best_policy() const {
-    return absl::StrCat(root, "/policy/best.safetensors");
-  }  // of evaluations
+  // The policy with the best evaluation.
+  std::string best_policy() const { return absl::StrCat(root, "/policy/best.safetensors"); }
   std::string logs() const { return absl::StrCat(root, "/logs"); }
   std::string log(absl::string_view process) const { return absl::StrCat(root, "/logs/", process, ".log"); }
   std::string replay_store() const { return absl::StrCat(root, "/replay.store"); }

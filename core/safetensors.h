@@ -11,21 +11,23 @@
 
 namespace dbr {
 
-// What one file holds. Checkpoints and policy files are both of this kind.
+// The contents of one file, as plain values. Checkpoints and policy files are both of this kind.
 struct TensorFile {
-  std::map<std::string, std::vector<float>> tensors;  // flat
+  std::map<std::string, std::vector<float>> tensors;  // by name; each flat, of one dimension
   std::map<std::string, std::string> metadata;        // counters, specs; the writer adds "crc32c" of the data
 };
 
-// Writes atomically (core/file_io.h). Errors: ResourceExhausted where the disk is full, NotFound,
-// PermissionDenied.
+// Writes a file atomically (core/file_io.h). Errors: ResourceExhausted where the disk is full, NotFound,
+// PermissionDenied. Blocks.
 absl::Status SaveTensors(const TensorFile& file, const std::string& path);
 
-// DataLoss, naming the file and what was expected and found, where it is truncated, its header is malformed,
-// an offset lies outside the data, or the checksum differs; NotFound where there is none.
+// Reads a file. DataLoss, naming the file and what was expected and found, where it is truncated, its header
+// is malformed, an offset lies outside the data, or the checksum differs; NotFound where there is none.
 absl::StatusOr<TensorFile> LoadTensors(const std::string& path);
 
-// A policy as a file: one tensor for each network, the spec and version in the metadata.
+// A policy as a file: one tensor for each network, with the spec and the version in the metadata. Errors are
+// those of SaveTensors and LoadTensors; InvalidArgument where the file is no policy's, DataLoss where its
+// metadata is damaged.
 absl::Status SavePolicy(const PolicySnapshot& snapshot, const std::string& path);
 absl::StatusOr<PolicySnapshot> LoadPolicy(const std::string& path);
 

@@ -6,12 +6,13 @@
 
 namespace dbr {
 
-// Blocks SIGINT and SIGTERM in the calling thread and in all threads it starts later. The first line of every
-// main: a gRPC thread that exists before would take the signal and nothing would drain. Ignores SIGPIPE.
+// Blocks SIGINT and SIGTERM in the calling thread and in all threads it starts later, and ignores SIGPIPE. It
+// is the first line of every main: a gRPC thread that existed before would take the signal and nothing would
+// drain.
 void BlockShutdownSignals();
 
-// Runs `on_signal` in a thread of its own at each SIGINT or SIGTERM, until destroyed. BlockShutdownSignals()
-// comes first.
+// Runs `on_signal` in a thread of its own at each SIGINT or SIGTERM, until destroyed; the destructor joins
+// the thread. Requires that BlockShutdownSignals() was called before any thread was started.
 class ShutdownWatcher {
  public:
   explicit ShutdownWatcher(std::function<void()> on_signal);

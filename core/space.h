@@ -1,4 +1,4 @@
-// What an agent sees and may do: the sizes that every part of the system agrees on.
+// The sizes of what an agent sees and may do, which every part of the system agrees on. Plain values.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ struct ActionSpace {
 // The static facts of an environment.
 struct EnvSpec {
   std::string name;
-  int observation_size = 0;
+  int observation_size = 0;  // floats
   ActionSpace actions;
   int max_episode_steps = 0;  // a longer episode is cut (truncation, not a terminal)
   bool has_score = false;     // episodes end with a score: 1 win, 0.5 draw, 0 loss

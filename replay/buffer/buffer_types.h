@@ -1,4 +1,4 @@
-// What goes into the buffer's calls and comes out of them.
+// The arguments and results of the replay buffer's calls, as plain values.
 #pragma once
 
 #include <array>
@@ -18,49 +18,57 @@ namespace dbr {
 
 struct BufferOptions {
   RateLimiterOptions limiter;
-  bool cumulative_advantage =
-      false;  // a relabel with a gives max(A, 0) + a in place of a (A: the label before)
-  // Share of the seed buffer in a draw from D, while D holds both; 0: as their sizes have it.
+  // A relabel with `a` gives max(A, 0) + a in place of a, where A is the label before.
+  bool cumulative_advantage = false;
+  // Share of the seed buffer's rows in a draw from D, while D holds others too; 0: as their numbers have it.
   double seed_buffer_share = 0;
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;                       // of the random numbers
   std::function<absl::Time()> now = absl::Now;  // for rates and the uptime
 };
 
+// An episode that ended with a row of an InsertBatch.
 struct RowEnd {
-  int row = 0;
+  int row = 0;  // from 0
   EpisodeEnd end;
 };
 
-// Transitions first_sequence, first_sequence + 1, ... of one writer.
+// Transitions of one writer with the sequence numbers first_sequence, first_sequence + 1, ...; views into
+// memory that the caller owns.
 struct InsertBatch {
   std::uint64_t first_sequence = 1;
   InsertColumns columns;
   absl::Span<const RowEnd> ends;  // by ascending row
-  int next_row = 0;               // how far Insert came; a second call goes on there
+  int next_row = 0;               // the first row that Insert has not dealt with; the next call goes on there
 };
 
 // How far the buffer holds a writer's sequence.
 struct WriterProgress {
-  std::uint64_t last_sequence = 0;
-  std::uint64_t refused = 0;
+  std::uint64_t last_sequence = 0;  // all rows up to this one are stored, or were refused for good
+  std::uint64_t refused = 0;        // rows of the writer that were refused, in all
 };
 
 struct DrawRequest {
-  std::array<std::uint32_t, kDrawnParts> counts{};  // from D, D+, D-
-  bool allow_empty_partitions = false;  // an empty partition gives nothing; else the draw waits for it
+  std::array<std::uint32_t, kDrawnParts> counts{};  // rows from D, D+, D-
+  bool allow_empty_partitions = false;  // an empty partition gives no rows; else the draw waits for one
 };
 
-using DrawBuffers = std::array<DrawColumns, kDrawnParts>;  // with room for the asked counts
+// Room for the asked counts from D, D+ and D-; the caller owns the memory.
+using DrawBuffers = std::array<DrawColumns, kDrawnParts>;
 
 struct DrawResult {
-  std::array<std::uint32_t, kDrawnParts> drawn{};  // the asked count, or 0 of an empty partition
-  std::uint64_t total = 0, plus = 0, minus = 0, unjudged = 0;
-  std::uint64_t inserted = 0, episodes = 0;  // without the seed buffer
-  double raised_tolerance = 0;  // other than 0 where the limiter's tolerance had to be raised for this draw
+  std::array<std::uint32_t, kDrawnParts> drawn{};  // the asked count, or 0 from an empty partition
+  std::uint64_t total = 0, plus = 0, minus = 0, unjudged = 0;  // rows held when the draw was made
+  std::uint64_t inserted = 0, episodes = 0;                    // without the seed buffer
+  double raised_tolerance =
+      0;  // the limiter's new tolerance, where it had to be raised for this draw; else 0
 };
 
+// What became of the keys of a relabel.
 struct RelabelResult {
-  std::uint64_t relabelled = 0, evicted = 0, stale = 0, refused = 0;
+  std::uint64_t relabelled = 0;
+  std::uint64_t evicted = 0;  // no longer held
+  std::uint64_t stale = 0;    // have a label of a newer critic already
+  std::uint64_t refused = 0;  // were given an advantage that is not finite
 };
 
 }  // namespace dbr

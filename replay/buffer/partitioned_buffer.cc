@@ -13,7 +13,7 @@
 namespace dbr {
 namespace {
 
-// Sequence numbers beyond this are no writer's; it leaves room for sums.
+// No writer has sequence numbers beyond this; it leaves room for sums.
 constexpr std::uint64_t kMaxSequence = std::uint64_t{1} << 62;
 
 absl::Status CheckBatch(const InsertBatch& batch) {
@@ -233,7 +233,7 @@ void PartitionedBuffer::Close() {
   admission_.Close();
 }
 
-// Without the lock: it reads nothing but where the mapping lies, and waits for the disk.
+// Takes no lock, for it waits for the disk and reads nothing but where the mapping lies.
 absl::Status PartitionedBuffer::Sync() ABSL_NO_THREAD_SAFETY_ANALYSIS {
   return store_->Sync();
 }

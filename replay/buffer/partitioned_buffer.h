@@ -46,10 +46,11 @@ class PartitionedBuffer {
   static absl::StatusOr<std::unique_ptr<PartitionedBuffer>> Make(std::unique_ptr<TransitionStore> store,
                                                                  const BufferOptions& options);
 
-  // Opens a stream of a writer: a place to insert with, to be closed again. Errors as WriterTable::Open's.
+  // Opens a stream of a writer and returns its place, which Insert takes and CloseWriter ends. Unavailable
+  // after Close; else errors of WriterTable::Open.
   absl::StatusOr<std::uint32_t> OpenWriter(const WriterIdentity& identity);
   void CloseWriter(std::uint32_t place);
-  WriterProgress Progress(std::uint32_t place) const;
+  WriterProgress Progress(std::uint32_t place) const;  // of a writer with an open stream
 
   // Stores `batch` row by row as the limiter admits, and moves batch->next_row along. Sequence numbers that
   // the writer has used are dropped as duplicates; rows with a non-finite value, an infinite advantage or a
@@ -59,23 +60,23 @@ class PartitionedBuffer {
   // pinned seed buffer has every place.
   absl::Status Insert(std::uint32_t place, InsertBatch* batch, absl::Time deadline);
 
-  // Appends rows of the seed buffer, flat as the layout lays them, not yet judged. The limiter does not ask
-  // for them, nor count them. InvalidArgument where they are more than fit; FailedPrecondition once something
-  // else has been inserted, or after CompleteSeedBuffer.
+  // Appends rows [n x stride] of the seed buffer, as core/transition.h lays them, not yet judged. The limiter
+  // neither holds nor counts them. InvalidArgument where they are more than fit; FailedPrecondition once
+  // something else has been inserted, or after CompleteSeedBuffer; Unavailable after Close.
   absl::Status InsertSeedBuffer(absl::Span<const float> rows);
-  // Ends the seed buffer and writes down what is known of it (`record`, but for its counts of rows); with
-  // `pin` none of its rows is ever evicted. FailedPrecondition as InsertSeedBuffer's.
+  // Says that the seed buffer is complete and stores `record`, whose counts of rows the store fills in. With
+  // `pin` none of its rows is ever evicted. Errors: FailedPrecondition and Unavailable as InsertSeedBuffer's.
   absl::Status CompleteSeedBuffer(const SeedBufferRecord& record, bool pin);
 
   // Draws with replacement into `out`, all parts under one snapshot. Blocks until the limiter admits and,
   // unless they may be empty, the asked partitions have something. Errors: DeadlineExceeded, naming what it
   // waited for; Unavailable after Close; InvalidArgument for no or too many draws. Sets
-  // result->raised_tolerance in either case.
+  // result->raised_tolerance even where it fails.
   absl::Status Draw(const DrawRequest& request, const DrawBuffers& out, absl::Time deadline,
                     DrawResult* result);
 
-  // Sets the advantages of `keys`, given by a critic of `version`, all under one lock. An older version never
-  // overwrites a newer one. InvalidArgument where the two lengths differ or there are too many.
+  // Sets the advantages of the rows `keys` [n], given by a critic of `version`, all under one lock. An older
+  // version never overwrites a newer one. InvalidArgument where the two lengths differ or there are too many.
   absl::StatusOr<RelabelResult> Relabel(std::uint64_t version, absl::Span<const std::uint64_t> keys,
                                         absl::Span<const float> advantages);
 
@@ -83,8 +84,10 @@ class PartitionedBuffer {
   // the answer may be some milliseconds apart.
   BufferStats Stats() const;
 
-  void Close();         // ends all waits with Unavailable and refuses later inserts and draws
-  absl::Status Sync();  // writes all to disk; blocks
+  // Ends all waits with Unavailable and refuses later inserts and draws.
+  void Close();
+  // Writes the store to disk. Blocks until it is there. Errors of TransitionStore::Sync.
+  absl::Status Sync();
 
   const TransitionLayout& layout() const { return layout_; }
   std::uint64_t capacity() const { return capacity_; }

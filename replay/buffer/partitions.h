@@ -1,4 +1,4 @@
-// Which rows lie in D, D+ (advantage >= 0), D- (advantage <= 0) or are not yet judged.
+// The partitions of the replay buffer: which rows lie in D, D+, D-, and which no critic has judged yet.
 #pragma once
 
 #include <array>
@@ -10,15 +10,22 @@
 
 namespace dbr {
 
-// The parts of a draw come first.
+// D holds all rows, D+ those with an advantage >= 0, D- those with one <= 0. The first three can be drawn
+// from.
 enum Part { kAll = 0, kPlus = 1, kMinus = 2, kUnjudgedPart = 3 };
 inline constexpr int kDrawnParts = 3;
 inline constexpr int kAllParts = 4;
 
-// Every operation is O(1). Thread-compatible: the buffer's lock guards it.
+// The slots of each part, to draw from:
+//
+//   advantage    NaN          > 0       0            < 0
+//   parts        D, unjudged  D, D+     D, D+, D-    D, D-
+//
+// Knows slots and advantages, not rows. Every operation is O(1). Thread-compatible: the buffer's mutex guards
+// it.
 class Partitions {
  public:
-  // All parts are empty. `capacity`: of the store.
+  // All parts are empty. `capacity`: slots of the store.
   explicit Partitions(std::uint32_t capacity)
       : parts_{SlotSet(capacity), SlotSet(capacity), SlotSet(capacity), SlotSet(capacity)} {}
 
@@ -42,10 +49,11 @@ class Partitions {
 
   const SlotSet& operator[](int part) const { return parts_[part]; }
   std::uint32_t size(int part) const { return parts_[part].size(); }
-  std::uint64_t seed_buffer(int part) const { return seed_buffer_[part]; }  // rows of source seed buffer
+  // Rows of the part that are the seed buffer's.
+  std::uint64_t seed_buffer(int part) const { return seed_buffer_[part]; }
 
  private:
-  // The parts beside D that an advantage belongs to, as bits.
+  // The parts beside D that a row of that advantage lies in, as bits.
   static unsigned Code(float advantage) {
     if (std::isnan(advantage)) return 1u << kUnjudgedPart;
     return (advantage >= 0 ? 1u << kPlus : 0) | (advantage <= 0 ? 1u << kMinus : 0);

@@ -1,4 +1,4 @@
-// Holds inserting and drawing together: how many transitions may be drawn for each one inserted.
+// The rate limiter: how many transitions may be drawn for each one that is inserted.
 #pragma once
 
 #include <cstdint>
@@ -21,18 +21,18 @@ struct RateLimiterOptions {
 // larger than that raises the tolerance to n / 2 for good, before it waits. Then one of the two can always go
 // on.
 //
-// A seed buffer counts as neither inserted nor sampled: `minimum` is min_size less the seed buffer's rows, at
-// least 0, and as long as there is nothing but seed buffer draws are free and are not counted.
+// The rows of the seed buffer count as neither inserted nor sampled: `minimum` is min_size less their number,
+// at least 0. While there are no others, draws are free and are not counted.
 //
-// Plain arithmetic without clock or lock; the buffer's lock guards it.
+// Plain arithmetic without clock or lock. Thread-compatible: the buffer's mutex guards it.
 class RateLimiter {
  public:
-  // The state that it judges by, over the life of the buffer.
+  // The counts of rows that it judges by, over the life of the buffer.
   struct Counts {
     std::uint64_t inserted = 0;     // without the seed buffer
-    std::uint64_t sampled = 0;      // since the first of these
-    std::uint64_t size = 0;         // all that is held
-    std::uint64_t seed_buffer = 0;  // rows that the buffer was begun with
+    std::uint64_t sampled = 0;      // since the first row that is not of the seed buffer
+    std::uint64_t size = 0;         // held now, the seed buffer's included
+    std::uint64_t seed_buffer = 0;  // of the seed buffer, that ever came in
   };
 
   // InvalidArgument for negative or non-finite numbers and for a minimum size of 0 or above `capacity`.
@@ -41,7 +41,7 @@ class RateLimiter {
   bool CanInsert(const Counts& counts) const;
   bool CanDraw(const Counts& counts, std::uint64_t n) const;
 
-  // To be called before a draw of n waits. True where the tolerance was raised for it.
+  // To be called before a draw of n waits. True where the tolerance was raised for it, to n / 2.
   bool MakeRoomFor(std::uint64_t n);
 
   // Sentences for people and errors: the limiter's bounds, its counters, and which bound holds the call.

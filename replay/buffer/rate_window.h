@@ -1,4 +1,4 @@
-// Events a second, over the last seconds.
+// How many events there are a second, over the last seconds.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,12 @@
 
 namespace dbr {
 
-// Counts in buckets of one second. Thread-compatible; time comes from the caller and never goes back far.
+// Counts events in a ring of buckets, one for each second:
+//
+//   second   100  101  102  103  104     second 105 takes the bucket of 100
+//   events    7    3    0    9    2
+//
+// Thread-compatible: the buffer's mutex guards it. Time comes from the caller and never goes back far.
 class RateWindow {
  public:
   explicit RateWindow(absl::Time start) : start_(start) {}
@@ -21,8 +26,8 @@ class RateWindow {
     bucket.events += events;
   }
 
-  // Mean over the running second and the kBuckets - 1 before it, or the time since the start where that is
-  // shorter.
+  // Events a second: the mean over the running second and the kBuckets - 1 before it, or over the time since
+  // the start where that is shorter.
   double PerSecond(absl::Time now) const {
     const std::int64_t first = absl::ToUnixSeconds(now) - (kBuckets - 1);
     std::uint64_t events = 0;

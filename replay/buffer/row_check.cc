@@ -10,7 +10,7 @@
 namespace dbr {
 namespace {
 
-// By the exponent's bits, so that the loop is vectorized.
+// Looks at the exponent's bits, so that the compiler vectorizes the loop.
 bool AllFinite(absl::Span<const float> values) {
   constexpr std::uint32_t kExponent = 0x7f800000u;
   std::uint32_t bad = 0;

@@ -1,4 +1,4 @@
-// Which transitions the replay refuses.
+// The check of rows on their way into the replay buffer.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,9 @@
 
 namespace dbr {
 
-// True for each row that has a NaN or an infinity in a column, an infinite advantage, or a discrete action
-// that is not one of the 0 ... mask width - 1; empty where there is no such row. O(values).
+// Returns [count], true for each row that the buffer refuses: with a NaN or an infinity in a column, with an
+// infinite advantage, or with a discrete action that is not one of 0 ... mask width - 1. Returns an empty
+// vector, without allocating, where there is no such row. Free of state, for any thread. O(floats).
 std::vector<bool> RefusedRows(const TransitionLayout& layout, const InsertColumns& columns);
 
 }  // namespace dbr

@@ -1,4 +1,4 @@
-// A set of the store's slots from which a random one is drawn.
+// A set of the store's slots that a random one can be drawn from.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,10 @@
 namespace dbr {
 
 // Slots are row numbers of the store, below the capacity that the set is made with. Every operation is O(1).
-// Takes 8 bytes a slot. Thread-compatible: the buffer's lock guards it.
+// Takes 8 bytes a slot. Thread-compatible: the buffer's mutex guards it.
 //
 //   members_   | 7 | 2 | 9 |           the slots of the set, without gaps
-//   places_      .   .   1   .  .  .  .  0  .  2     where each slot stands in members_; "." is absent
+//   places_      .   .   1   .  .  .  .  0  .  2     where slots 0 to 9 stand in members_; "." is absent
 class SlotSet {
  public:
   explicit SlotSet(std::uint32_t capacity);

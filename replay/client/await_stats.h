@@ -1,4 +1,4 @@
-// The replay server's statistics, for a process that cannot begin without them.
+// Waiting for the statistics of a replay server, for processes that cannot begin without them.
 #pragma once
 
 #include "absl/status/statusor.h"
@@ -9,8 +9,9 @@
 
 namespace dbr {
 
-// Asks until the server answers, and logs once, with `purpose`, that it waits. Cancelled after `stopping`,
-// within a second; an error of a server that will never answer (IsFinal), as one that is another program.
+// Asks until the server answers. Blocks; logs once, with `purpose`, that it waits. Errors: Cancelled, within
+// a second of `stopping`; the server's error where it is final (IsFinal), as from a server of another
+// program.
 absl::StatusOr<StatsReply> AwaitStats(ReplayClient* client, absl::string_view purpose,
                                       const absl::Notification& stopping);
 

@@ -1,4 +1,4 @@
-// The transitions of a writer from their coming until their acknowledgement, as messages.
+// The messages of a writer, from when a transition is appended until it is acknowledged.
 #pragma once
 
 #include <cstddef>
@@ -17,35 +17,51 @@ namespace dbr {
 struct OutboxOptions {
   TransitionLayout layout;
   std::size_t rows_per_message = 1;
-  std::size_t window = 1;  // messages under way
-  absl::Duration
-      max_batch_age;  // when a message goes out that is not full, or an acknowledgement is asked for
+  std::size_t window = 1;  // messages under way, at most
+  // After this a message goes out that is not full, or an acknowledgement is asked for.
+  absl::Duration max_batch_age;
 };
 
-// A message is filled by Append, sealed when it is full, or when it is old or waited for and nothing else is
-// to be sent; it is sent, and dropped when it is acknowledged:
-//   filling_  ->  sealed_[sent_ ...]  ->  sealed_[0 ... sent_)  ->  gone.
-// A quarter of a window apart, and with each message that was sealed early, an acknowledgement is asked for;
-// so one is always under way while the window is full. Thread-compatible: the writer's lock guards it; time
-// comes from the caller.
+// Append fills a message. It is sealed when it is full, or when it is old or waited for and nothing else is
+// to be sent. Next sends it, and when it is acknowledged its memory is used for another one:
+//
+//      Append               Next                      Acknowledge
+//   spare_ -> filling_  ->  sealed_[sent_ ..)     ->  sealed_[0 .. sent_)           ->  spare_
+//             | 48 .. |     | 47 | 46 |               | 45 | 44 | 43 | 42 | 41 |
+//             not full      waits to be sent          under way: at most a window
+//
+// Every quarter of a window, and each message that was sealed early, asks for an acknowledgement (?), so that
+// one is always under way while the window is full. It takes all messages up to its sequence number. With a
+// window of 8:
+//
+//   sent       41   42?  43   44?  45   46?  47   48?       the window is full
+//   acknowledged up to 42:
+//   sent                 43   44?  45   46?  47   48?  49   50?
+//
+// After a broken stream Restart sets sent_ to 0: all that are sealed are sent again, and the server drops
+// what it holds. Thread-compatible: the writer's mutex guards it; time comes from the caller.
 class Outbox {
  public:
   explicit Outbox(const OutboxOptions& options);
 
+  // Copies a transition, with the end of its episode where it ended one. Has no bound of its own: the writer
+  // appends while appended() - acknowledged() is below its own.
   void Append(const TransitionView& transition, float advantage, std::uint64_t critic_version,
               const std::optional<EpisodeEnd>& end, absl::Time now);
 
-  // When Next has something: at once, at the time when what there is will be old, or never. `waited_for`:
-  // somebody waits for room or for the last acknowledgement.
+  // The time from which Next has a message: the past where it has one now, the time when what there is will
+  // be old, or the infinite future. `waited_for`: somebody waits for room or for the last acknowledgement.
   absl::Time NextTime(bool waited_for) const;
   // The next message to send, or null where NextTime is later than `now`. It must not be changed; it may come
   // again on another stream.
   std::shared_ptr<const InsertRequest> Next(absl::Time now, bool waited_for);
 
+  // Takes the server's word that it holds all up to a sequence number.
   void Acknowledge(const InsertReply& reply);
   // Begins anew with all that is not acknowledged, for another stream.
   void Restart();
 
+  // Transitions so far: appended, acknowledged, and of these refused for good by the server.
   std::uint64_t appended() const { return appended_; }
   std::uint64_t acknowledged() const { return acknowledged_; }
   std::uint64_t refused() const { return refused_; }

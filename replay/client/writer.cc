@@ -239,7 +239,7 @@ class TransitionWriter::Impl {
   absl::Status final_error_ ABSL_GUARDED_BY(mutex_);
   grpc::ClientContext* context_ ABSL_GUARDED_BY(mutex_) = nullptr;  // of the stream under way
 
-  // Of the sending thread alone.
+  // The sending thread alone uses these.
   bool lost_ = false;
   int failures_ = 0;
   Rng jitter_;

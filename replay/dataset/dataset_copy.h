@@ -1,4 +1,4 @@
-// From one layout to another.
+// Copying offline data from a file of one layout to a file of another.
 #pragma once
 
 #include <cstdint>
@@ -10,10 +10,11 @@
 
 namespace dbr {
 
-// Appends all transitions of `reader` to `writer`, in episodes, and does not finish it. What a gap (a row
-// that was left out) cuts off becomes an episode of its own. After every few thousand transitions `go_on`
-// hears how many there were so far; Cancelled soon after it answers false. Other errors: those of reader and
-// writer. Sizes must fit (CHECKed). Holds one episode in memory.
+// Appends all transitions of `reader` to `writer`, episode by episode, and leaves it to the caller to finish
+// the writer. What a gap (a row that was left out) cuts off becomes an episode of its own. Calls `go_on`
+// after every few thousand transitions with their number so far; Cancelled soon after it returns false. Other
+// errors are the reader's and the writer's. Requires that their sizes agree (CHECKed). Holds one episode in
+// memory.
 absl::Status CopyDataset(DatasetReader* reader, DatasetWriter* writer,
                          const std::function<bool(std::int64_t)>& go_on);
 

@@ -1,4 +1,4 @@
-// What a file of offline data holds, counted while it is read.
+// The facts of a file of offline data, counted while it is read.
 #pragma once
 
 #include <cstdint>
@@ -7,14 +7,15 @@
 namespace dbr {
 
 struct DatasetFacts {
-  std::int64_t rows = 0;         // of the file (minari: steps); known from the start
+  std::int64_t rows = 0;         // rows of the file (minari: steps); known from the start
   std::int64_t transitions = 0;  // handed out
-  std::int64_t episodes =
-      0;  // that ended: terminals + timeouts; one that the file's end cuts is not among them
+  // Episodes that ended: terminals + timeouts. One that the file's end cuts is not among them.
+  std::int64_t episodes = 0;
   std::int64_t terminals = 0;   // ends of the task
   std::int64_t timeouts = 0;    // cuts at the time limit
   std::int64_t non_finite = 0;  // rows with a NaN or an infinite value
-  // Of the undiscounted returns of the episodes that ended and have no such row; NaN where there are none.
+  // Statistics of the undiscounted returns of the episodes that ended and have no such row; NaN where there
+  // are none.
   double return_mean = std::numeric_limits<double>::quiet_NaN();
   double return_std = std::numeric_limits<double>::quiet_NaN();  // of the population
   double return_min = std::numeric_limits<double>::quiet_NaN();

@@ -17,10 +17,10 @@ namespace dbr {
 
 struct DatasetOptions {
   std::optional<DatasetLayout> layout = std::nullopt;  // empty: as the file's own attribute `layout` says
-  std::string env = "";                                // whose data is expected, for messages; empty: any
-  int observation_size = 0;                            // expected; 0: any
-  int action_width = 0;                                // expected; 0: any
-  float discount = 0.99f;                              // of a transition after which the task goes on
+  std::string env = "";      // environment whose data is expected, for messages; empty: any
+  int observation_size = 0;  // expected; 0: any
+  int action_width = 0;      // expected; 0: any
+  float discount = 0.99f;    // of a transition after which the task goes on
   // d4rl_pybullet and d4rl without `timeouts`: an episode of that many steps is cut, not terminal. 0: as the
   // file's own attribute `max_episode_steps` says, else 1,000.
   int max_episode_steps = 0;
@@ -61,7 +61,7 @@ class DatasetReader {
   // does not move the stream.
   absl::StatusOr<std::int64_t> CountTransitions();
 
-  // Of what was read so far; complete after Next gave 0. `rows` is right from the start.
+  // The facts of what was read so far; they are complete after Next gave 0. `rows` is right from the start.
   const DatasetFacts& facts() const;
 
  private:

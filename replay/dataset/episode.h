@@ -10,7 +10,7 @@ namespace dbr {
 // kUnfinished: the data stops before the episode does.
 enum class EpisodeEnding { kTerminal, kTimeLimit, kUnfinished };
 
-// T >= 1 steps of one episode, as views into memory of somebody else's.
+// T >= 1 steps of one episode, as views into memory that the caller owns.
 struct EpisodeView {
   absl::Span<const float> observations;  // [T + 1][observation size]
   absl::Span<const float> actions;       // [T][action width]
@@ -20,8 +20,8 @@ struct EpisodeView {
   int steps() const { return static_cast<int>(rewards.size()); }
 };
 
-// The same in memory of its own, to be grown step by step: the first observation, then for each step its
-// action, its reward and the observation that it led to.
+// An episode in memory of its own, which grows step by step: the first observation, then for each step its
+// action, its reward and the observation that it led to. Thread-compatible.
 struct EpisodeRows {
   std::vector<float> observations;
   std::vector<float> actions;
@@ -46,7 +46,7 @@ struct EpisodeRows {
   EpisodeView View() const { return {observations, actions, rewards, ending}; }
 };
 
-// The first `steps` of an episode of more; unfinished.
+// The first `steps` of an episode that has more, as an unfinished one. Views into the same memory.
 inline EpisodeView FirstSteps(const EpisodeView& episode, int steps) {
   const std::size_t all = episode.rewards.size(), first = static_cast<std::size_t>(steps);
   return {.observations = episode.observations.first(episode.observations.size() / (all + 1) * (first + 1)),

@@ -20,7 +20,7 @@ constexpr std::size_t kDefaultCacheBytes = std::size_t{1} << 20;
 constexpr std::size_t kMaxCacheBytes = std::size_t{64} << 20;
 constexpr std::size_t kCacheSlots = 521;  // the library's default: a prime
 
-// Whether the system lets us read the file at all; the library's own words for it are of little help.
+// Checks that the system lets us read the file at all; the library's own words for it are of little help.
 absl::Status CheckReadable(const std::string& path) {
   const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) return ErrnoStatus(errno, "cannot read", path);

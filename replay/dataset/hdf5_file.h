@@ -19,10 +19,10 @@ class Hdf5Column {
   int width() const { return width_; }
   const std::string& name() const { return name_; }
 
-  // Rows [first, first + count) into `values` [count x width], whatever the numbers' type in the file.
+  // Reads rows [first, first + count) into `values` [count x width], whatever the numbers' type in the file.
   // DataLoss where the file cannot be read.
   absl::Status ReadFloats(std::int64_t first, int count, float* values) const;
-  // The same of a column of width 1: 1 where the number is not zero, else 0.
+  // Reads rows of a column of width 1 as flags [count]: 1 where the number is not zero, else 0.
   absl::Status ReadFlags(std::int64_t first, int count, std::uint8_t* flags) const;
 
  private:

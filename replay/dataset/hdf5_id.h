@@ -8,7 +8,7 @@
 
 namespace dbr {
 
-// Closes its identifier with the function that fits its kind.
+// Owns an identifier and closes it with the function that fits its kind. Thread-compatible.
 class Hdf5Id {
  public:
   using Closer = herr_t (*)(hid_t);
@@ -36,11 +36,10 @@ class Hdf5Id {
   Closer close_ = nullptr;
 };
 
-// The library prints each error to stderr unless told otherwise, for each thread anew. Call it before
-// anything else.
+// Keeps the library from printing this thread's errors to stderr. Call it before anything else.
 void SilenceHdf5();
 
-// The innermost reason of this thread's last failed call.
+// The innermost reason for which this thread's last failed call failed.
 std::string Hdf5Reason();
 
 }  // namespace dbr

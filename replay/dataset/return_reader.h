@@ -22,11 +22,11 @@ class ReturnReader {
   // reader was opened with.
   ReturnReader(DatasetReader* reader, float discount);
 
-  // The reader's layout and a return.
+  // The reader's layout with a return.
   const TransitionLayout& layout() const { return layout_; }
 
-  // The rows [T x stride] of the next stretch, flat as layout() lays them; empty at the end. Valid until the
-  // next call. Errors: DatasetReader::Next's.
+  // The rows [T x stride] of the next stretch, as layout() lays them; empty at the end. They are valid until
+  // the next call. Errors are DatasetReader::Next's. Reads from disk.
   absl::StatusOr<absl::Span<const float>> Next();
 
  private:

@@ -28,24 +28,34 @@ struct FlatColumns {
   std::optional<Hdf5Column> next_observations;
 };
 
-// Sets bad[i] where row i of `values` [rows x width] has a value that is not finite. Fast where none has.
+// Sets bad[i] to 1 where row i of `values` [rows x width] has a value that is not finite. Fast where none
+// has.
 void MarkNonFinite(absl::Span<const float> values, int width, std::vector<std::uint8_t>* bad);
 
-// Rows in float32, a stretch at a time. Thread-compatible.
+// Rows in float32, a stretch at a time; the last row of one stretch is the first of the next, for a
+// transition needs two:
+//
+//   file     | 0 ............. 16383 | 16384 ............ |
+//   window     [0 ............. rows)
+//   Advance                  [0 ............ rows)           row 0 is the last one of before
+//
+// Thread-compatible.
 class RowWindow {
  public:
   static constexpr int kStretch = 16384;  // rows read at once
 
+  // `flags_only`: reads neither observations nor actions nor rewards.
   RowWindow(FlatColumns columns, bool flags_only);
 
   // Keeps the last row as row 0 and reads the following ones behind it. False where no row was left to read.
+  // Errors are Hdf5Column's.
   absl::StatusOr<bool> Advance();
 
-  int rows() const { return rows_; }
-  bool at_end() const {
-    return next_row_ == columns_.rewards.rows();
-  }  // the last row of the file is in the window
+  int rows() const { return rows_; }  // in the window
+  // Whether the last row of the file is in the window.
+  bool at_end() const { return next_row_ == columns_.rewards.rows(); }
 
+  // Row i of the window, 0 <= i < rows(). Pointers are valid until Advance, and null with flags only.
   const float* observation(int i) const { return At(observations_, columns_.observations, i); }
   const float* action(int i) const { return At(actions_, columns_.actions, i); }
   const float* next_observation(int i) const {

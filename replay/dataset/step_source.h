@@ -1,5 +1,5 @@
-// The steps of a file, whatever its layout: what the readers of the layouts give to the reader of
-// transitions.
+// The steps of a file, whatever its layout: what the reader of transitions takes from the readers of the
+// layouts.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +11,7 @@
 
 namespace dbr {
 
+// Whether an episode ends with a step: not, because the task ended, or because it was cut.
 enum class StepEnd : std::uint8_t { kNone, kTerminal, kCut };
 
 // One step of an episode. Pointers are null where only the flags are read, and `next_observation` also where
@@ -25,21 +26,21 @@ struct Step {
   bool bad = false;       // a row that it takes values from has one that is not finite
   // The next step ends the episode without being a transition: this one is the episode's last transition.
   bool last_transition = false;
-  float following_reward = 0;  // the next step's, where last_transition
+  float following_reward = 0;  // the next step's reward, where last_transition; else 0
 };
 
 // Rows with values that are not finite, among those read so far.
 struct BadRows {
   std::int64_t count = 0;
-  std::int64_t first = -1;
+  std::int64_t first = -1;  // number of the first one; -1: none
 };
 
 struct StepSourceOptions {
-  int max_episode_steps = 0;
-  bool flags_only = false;  // reads neither observations nor actions nor rewards
+  int max_episode_steps = 0;  // longer episodes are cut; as DatasetOptions
+  bool flags_only = false;    // reads neither observations nor actions nor rewards
 };
 
-// A stream of steps. Thread-compatible.
+// A stream of a file's steps in its order. Thread-compatible.
 class StepSource {
  public:
   virtual ~StepSource() = default;
@@ -49,13 +50,15 @@ class StepSource {
   virtual int observation_size() const = 0;
   virtual int action_width() const = 0;
 
-  // The next steps, at least one; none at the end. Valid until the next call.
+  // The next steps, at least one; none at the end. They are valid until the next call. DataLoss where the
+  // file cannot be read.
   virtual absl::StatusOr<absl::Span<const Step>> NextSteps() = 0;
 
   virtual BadRows bad_rows() const = 0;
 };
 
-// Each checks keys, shapes and lengths of the file, which has to outlive the source.
+// Each opens the steps of a layout. InvalidArgument where keys, shapes or lengths are not the layout's. The
+// file is not owned and outlives the source.
 absl::StatusOr<std::unique_ptr<StepSource>> OpenD4rlSteps(const Hdf5File& file,
                                                           const StepSourceOptions& options);
 absl::StatusOr<std::unique_ptr<StepSource>> OpenPybulletSteps(const Hdf5File& file,

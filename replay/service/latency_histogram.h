@@ -1,4 +1,4 @@
-// How long calls take.
+// A histogram of how long calls take.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 
 namespace dbr {
 
-// Durations in buckets that grow by a quarter of a power of two, 1 us and below to 70 minutes. Thread-safe
-// without a lock; a quantile read while others record may miss them.
+// Counts durations in buckets that grow by a quarter of a power of two, 1 us and below to 70 minutes.
+// Thread-safe without a lock; a quantile read while others record may miss them.
 class LatencyHistogram {
  public:
   void Record(absl::Duration duration);
@@ -25,7 +25,7 @@ class LatencyHistogram {
   std::array<std::atomic<std::uint64_t>, kBuckets> buckets_{};
 };
 
-// Records the time from its making to its end.
+// Records the time from its construction to its destruction. `histogram` is not owned and outlives it.
 class LatencyTimer {
  public:
   explicit LatencyTimer(LatencyHistogram* histogram);

@@ -1,4 +1,4 @@
-// Everything behind the program dbr-replay: store, buffer, service and gRPC server.
+// The replay server behind the program dbr-replay: store, buffer, service and gRPC server in one.
 #pragma once
 
 #include <memory>
@@ -24,18 +24,18 @@ struct ReplayServerOptions {
   ServerOptions server;
 };
 
-// What `config` says, for transitions of that layout; paths and address are the caller's to set. A
+// The options that `config` gives, for transitions of that layout; the caller sets paths and address. A
 // tolerance of 0 becomes a tenth of capacity * samples_per_insert.
 ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& layout);
 
-// What `config` says of the seed.
+// The options of the seed buffer that `config` gives.
 SeedBufferOptions SeedBufferOptionsFrom(const Config& config);
 
 // A running replay server. Thread-compatible.
 class ReplayServer {
  public:
-  // Loads the seed buffer before it serves. Errors of TransitionStore::Open, PartitionedBuffer::Make,
-  // ImportSeedBuffer and StartServer.
+  // Opens the store, loads the seed buffer, and then serves. Blocks meanwhile. Errors of
+  // TransitionStore::Open, PartitionedBuffer::Make, ImportSeedBuffer and StartServer.
   static absl::StatusOr<std::unique_ptr<ReplayServer>> Start(const ReplayServerOptions& options);
   ~ReplayServer();  // Stop()
   ReplayServer(const ReplayServer&) = delete;

@@ -19,7 +19,7 @@ absl::Status CheckEnough(const SeedBufferOptions& options, std::uint64_t transit
   return absl::InvalidArgumentError(absl::StrCat(
       "replay.seed_buffer.path: expected at least ", std::max<std::uint64_t>(1, options.min_rows),
       " transitions (replay.min_size, before which nothing is drawn), found ", transitions, " in ",
-      options.path, ". Lower replay.min_size or take a larger seed."));
+      options.path, ". Lower replay.min_size or take a larger seed buffer."));
 }
 
 absl::Status CheckRoom(const SeedBufferOptions& options, std::uint64_t transitions, std::uint64_t capacity) {
@@ -38,7 +38,7 @@ absl::Status CheckRoom(const SeedBufferOptions& options, std::uint64_t transitio
   return CheckEnough(options, transitions);
 }
 
-// A reader of the file, whose transitions fit.
+// Opens a reader of the file and checks that its transitions fit.
 absl::StatusOr<std::unique_ptr<DatasetReader>> OpenFitting(const SeedBufferOptions& options,
                                                            const TransitionLayout& layout,
                                                            std::uint64_t capacity) {
@@ -79,7 +79,7 @@ SeedBufferRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
           .rows_per_second = static_cast<double>(facts.transitions) / absl::ToDoubleSeconds(elapsed)};
 }
 
-// The file's rows, flat as the buffer lays them, with returns where it wants them.
+// The file's rows [n x stride], as the buffer lays them, with returns where it wants them.
 class SeedBufferRows {
  public:
   // `reader` outlives this.
@@ -91,7 +91,7 @@ class SeedBufferRows {
     }
   }
 
-  // Some rows; none at the end. Valid until the next call.
+  // The next rows; none at the end. They are valid until the next call.
   absl::StatusOr<absl::Span<const float>> Next() {
     if (returns_.has_value()) return returns_->Next();
     RETURN_IF_ERROR(reader_->Next(&*chunk_).status());

@@ -26,7 +26,7 @@ absl::Status WaitInSlices(const grpc::ServerContext& context, absl::Time deadlin
   }
 }
 
-// When a draw must stop waiting so that its answer comes before the caller's own deadline.
+// The time at which a draw must stop waiting, so that its answer comes before the caller's own deadline.
 absl::Time WaitDeadline(const grpc::ServerContext& context, const SampleRequest& request) {
   const absl::Time now = absl::Now();
   const absl::Time call_deadline = absl::FromChrono(context.deadline());

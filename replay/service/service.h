@@ -9,13 +9,15 @@
 
 namespace dbr {
 
-// Decodes, calls the buffer, encodes. Thread-safe. A call that waits for the limiter looks every kCancelCheck
-// whether its client is still there; PartitionedBuffer::Close ends all waits.
+// The calls of proto/replay.proto: each decodes, calls the buffer and encodes. Thread-safe. A call that waits
+// for the limiter checks every kCancelCheck whether its client is still there; PartitionedBuffer::Close ends
+// all waits.
 class ReplayService final : public Replay::Service {
  public:
   static constexpr absl::Duration kCancelCheck = absl::Milliseconds(200);
 
-  explicit ReplayService(PartitionedBuffer* buffer) : buffer_(buffer) {}  // not owned
+  // `buffer` is not owned and outlives this.
+  explicit ReplayService(PartitionedBuffer* buffer) : buffer_(buffer) {}
 
   grpc::Status Insert(grpc::ServerContext* context,
                       grpc::ServerReaderWriter<InsertReply, InsertRequest>* stream) override;

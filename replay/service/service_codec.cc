@@ -17,7 +17,7 @@ SampledPart* PartOf(int part, SampleReply* reply) {
                          : reply->mutable_minus();
 }
 
-// Without writing zeros first.
+// Makes a field `size` long and returns its memory, without writing zeros first; null for none.
 template <class Value>
 Value* Room(std::size_t size, google::protobuf::RepeatedField<Value>* field) {
   if (size == 0) return nullptr;

@@ -12,18 +12,24 @@
 
 namespace dbr {
 
-// What a store's contents mean; a file whose shape differs is refused.
+// What the contents of a store's file mean. It stands in the file's header; a file with another one is
+// refused.
 struct StoreShape {
   std::string env;  // name of the environment, at most 63 bytes
   TransitionLayout layout;
   std::uint64_t capacity = 0;     // rows
-  std::uint64_t total_bytes = 0;  // of the file, its header included
+  std::uint64_t total_bytes = 0;  // size of the file, its header included
 };
 
-// A mapping of `total_bytes`: kHeaderBytes for the header of this class, the rest for its user, zero in a
-// fresh one. The file's pages belong to the system: what was written to them outlives a kill of the process
-// (not a loss of power; Sync is for that). A file is locked against a second process as long as it is mapped.
-// Thread-compatible.
+// A mapping of `total_bytes`:
+//
+//   | header, kHeaderBytes | contents: of the user, zero in a fresh file |
+//     magic, format,         ^ contents()
+//     shape, CRC-32C
+//
+// The file's pages belong to the system: what was written to them outlives a kill of the process (not a loss
+// of power; Sync is for that). A file is locked against a second process as long as it is mapped. Unmapped by
+// the destructor. Thread-compatible.
 class StoreFile {
  public:
   static constexpr std::size_t kHeaderBytes = 4096;
@@ -41,7 +47,8 @@ class StoreFile {
 
   std::byte* contents() const { return map_ + kHeaderBytes; }
 
-  // Writes all to disk; blocks until it is there. Nothing to do for memory alone.
+  // Writes all to disk; blocks until it is there. Does nothing for memory alone. Errors are the system's,
+  // with the path.
   absl::Status Sync();
 
  private:

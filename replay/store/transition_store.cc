@@ -98,7 +98,7 @@ TransitionStore::TransitionStore(const TransitionLayout& layout, std::uint64_t c
   rows_ = reinterpret_cast<float*>(section);
 }
 
-// Guards against a file that was damaged, not against our own writing.
+// This guards against a file that was damaged, not against our own writing.
 bool TransitionStore::LooksWhole(std::uint64_t key) const {
   const Meta& meta = metas_[SlotOf(key)];
   return meta.key == key && meta.labels.writer < WriterTable::kPlaces &&

@@ -1,4 +1,5 @@
-// Who has written into the buffer, and how far: the memory behind "a resend is not stored twice".
+// The writers of a store, and how far each has come: what keeps a row that is sent again from being stored
+// twice.
 #pragma once
 
 #include <cstddef>
@@ -12,6 +13,7 @@
 
 namespace dbr {
 
+// Where a row comes from: an actor, or the offline data of the seed buffer.
 enum class Source : std::uint32_t { kOnline = 0, kSeedBuffer = 1 };
 
 // What a writer says of itself when it opens a stream.
@@ -21,21 +23,22 @@ struct WriterIdentity {
   Source source = Source::kOnline;
 };
 
-// A writer as it lies in the store's file; an id of 0 is an empty place.
+// A writer as it lies in the store's file: the layout is a format on disk (StoreFile, kFormat). An id of 0 is
+// an empty place.
 struct WriterRecord {
   std::uint64_t id;
-  std::uint64_t last_sequence;  // all up to it are stored, or were refused or dropped for good
-  std::uint64_t inserted;
-  std::uint64_t duplicates;
-  std::uint64_t refused;
-  std::uint64_t opened;  // counts the openings of all writers: the smallest is the one longest away
+  std::uint64_t last_sequence;  // all rows up to it are stored, or were refused or dropped for good
+  std::uint64_t inserted;       // rows
+  std::uint64_t duplicates;     // rows that it sent again
+  std::uint64_t refused;        // rows with values that make no sense
+  std::uint64_t opened;         // counts the openings of all writers: the smallest is the one longest away
   Source source;
   char name[64];
 };
 
-// The records of all writers, in memory of the store's, and what of them needs no file. A place whose writer
-// holds no row and has no stream is given to a new writer when all are taken, the one longest away first.
-// Thread-compatible.
+// The records of all writers, which lie in the store's memory, and what is known of them while the process
+// lives. When all places are taken, a new writer gets the place of one that has no row in the buffer and no
+// stream, the one longest away first. Thread-compatible: the buffer's mutex guards it.
 class WriterTable {
  public:
   static constexpr std::size_t kPlaces = 4096;
@@ -48,11 +51,14 @@ class WriterTable {
   absl::StatusOr<std::uint32_t> Open(const WriterIdentity& identity);
   void Close(std::uint32_t place) { --volatile_[place].streams; }
 
+  // The record at a place that Open gave, or any place below kPlaces.
   WriterRecord& record(std::uint32_t place) { return records_[place]; }
   const WriterRecord& record(std::uint32_t place) const { return records_[place]; }
 
+  // Rows of the writer in the buffer.
   std::uint64_t held(std::uint32_t place) const { return volatile_[place].held; }
   void AddHeld(std::uint32_t place, std::int64_t rows) { volatile_[place].held += rows; }
+  // Whether the writer has a stream open.
   bool connected(std::uint32_t place) const { return volatile_[place].streams > 0; }
 
  private:
