@@ -92,16 +92,20 @@ absl::StatusOr<Config> ParseConfig(absl::string_view text, const std::vector<std
   return Parse(text, overrides, "config");
 }
 
-std::string PrintConfig(const Config& config) {
-  Config effective = config;
-  DefaultAlgorithm(&effective);
-  Materialise(&effective);
+Config WithDefaults(const Config& config) {
+  Config whole = config;
+  DefaultAlgorithm(&whole);
+  Materialise(&whole);
   const std::vector<int> sizes = HiddenSizes(config);
-  effective.mutable_network()->mutable_hidden_sizes()->Assign(sizes.begin(), sizes.end());
+  whole.mutable_network()->mutable_hidden_sizes()->Assign(sizes.begin(), sizes.end());
+  return whole;
+}
+
+std::string PrintConfig(const Config& config) {
   google::protobuf::TextFormat::Printer printer;
   printer.SetUseShortRepeatedPrimitives(true);
   std::string text;
-  printer.PrintToString(effective, &text);
+  printer.PrintToString(WithDefaults(config), &text);
   return text;
 }
 

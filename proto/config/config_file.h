@@ -18,10 +18,14 @@ namespace dbr {
 absl::StatusOr<Config> LoadConfig(const std::string& path, const std::vector<std::string>& overrides = {});
 absl::StatusOr<Config> ParseConfig(absl::string_view text, const std::vector<std::string>& overrides = {});
 
-// The effective config as text, every field with its value, defaults included; ParseConfig reads it back.
+// `config` with every field set: the schema's default where `config` sets none, "dbr" where it names no
+// algorithm, and HiddenSizes(). Two configs mean the same where these are equal. Bounds are not looked at.
+Config WithDefaults(const Config& config);
+
+// WithDefaults(config) as text; ParseConfig reads it back as that.
 std::string PrintConfig(const Config& config);
 
-// Whether all of the updates are made on the seed, so that no actor ever acts.
+// Whether all of the updates are made on the seed buffer, so that no actor ever acts.
 bool TrainsOfflineAlone(const Config& config);
 
 // Whether transitions carry their Monte-Carlo returns (TransitionLayout::Of): DBR's advantage SIL takes R -

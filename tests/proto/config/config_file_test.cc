@@ -4,6 +4,7 @@
 #include <google/protobuf/util/message_differencer.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 
 #include "absl/strings/str_split.h"
@@ -215,6 +216,37 @@ TEST(PrintConfigTest, ReadsBackAsItself) {
   EXPECT_EQ(again.env().name(), config.env().name());
   // Parsed again and printed, nothing is left to default.
   EXPECT_TRUE(MessageDifferencer::Equals(again, Parsed(PrintConfig(again))));
+}
+
+// The configs that are shipped, and one of each algorithm.
+std::vector<Config> SeveralConfigs() {
+  std::vector<Config> configs = {Config(),
+                                 Parsed("network { hidden_sizes: [7, 9] } env { opponents: \"random\" }")};
+  for (const auto& entry : std::filesystem::directory_iterator(DBR_SOURCE_DIR "/deploy/configs"))
+    configs.push_back(LoadConfig(entry.path().string()).value());
+  for (const char* algorithm : {"dbr", "sac", "bear", "brac", "td3", "awac", "ddqn", "discrete_sac"})
+    configs.push_back(
+        Parsed("algorithm { learning_rate: 0.00012345678901234567 " + std::string(algorithm) + " {} }"));
+  return configs;
+}
+
+TEST(WithDefaultsTest, IsWhatThePrintedConfigReadsBackAs) {
+  const std::vector<Config> configs = SeveralConfigs();
+  EXPECT_GT(configs.size(), 15);
+  for (const Config& config : configs) {
+    const std::string text = PrintConfig(config);
+    EXPECT_TRUE(MessageDifferencer::Equals(WithDefaults(config), Parsed(text))) << text;
+  }
+}
+
+TEST(WithDefaultsTest, ADefaultThatIsWrittenOutChangesNothing) {
+  const Config short_one = Parsed("algorithm { sac {} }");
+  const Config long_one = Parsed(
+      "seed: 1 algorithm { discount: 0.99 sac { first_temperature: 1 } } "
+      "network { hidden_sizes: [256, 256, 256] }");
+  EXPECT_FALSE(MessageDifferencer::Equals(short_one, long_one));
+  EXPECT_TRUE(MessageDifferencer::Equals(WithDefaults(short_one), WithDefaults(long_one)));
+  EXPECT_TRUE(MessageDifferencer::Equals(WithDefaults(short_one), WithDefaults(WithDefaults(short_one))));
 }
 
 TEST(NeedsReturnsTest, OnlyTheAdvantageOfSelfImitationTakesThem) {
