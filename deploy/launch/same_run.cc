@@ -5,16 +5,14 @@
 #include <filesystem>
 
 #include "absl/strings/str_cat.h"
-#include "core/status_macros.h"
 #include "proto/config/config_file.h"
 
 namespace dbr {
 namespace {
 
-// What must be equal for one run to go on as another, read through the printed form, in which every default
-// stands written.
-absl::StatusOr<Config> Identity(const Config& config) {
-  ASSIGN_OR_RETURN(const Config whole, ParseConfig(PrintConfig(config)));
+// What must be equal for one run to go on as another.
+Config Identity(const Config& config) {
+  const Config whole = WithDefaults(config);
   Config identity;
   *identity.mutable_env() = whole.env();
   *identity.mutable_network() = whole.network();
@@ -29,9 +27,27 @@ absl::StatusOr<Config> Identity(const Config& config) {
   return identity;
 }
 
-// What two runs must share to come to the same.
-absl::StatusOr<Config> Outcome(const Config& config) {
-  ASSIGN_OR_RETURN(Config outcome, ParseConfig(PrintConfig(config)));
+// What differs between two messages of one type, as "path: before -> now" lines.
+std::string Differences(const google::protobuf::Message& before, const google::protobuf::Message& now) {
+  google::protobuf::util::MessageDifferencer differencer;
+  differencer.set_message_field_comparison(google::protobuf::util::MessageDifferencer::EQUIVALENT);
+  std::string report;
+  differencer.ReportDifferencesToString(&report);
+  return differencer.Compare(before, now) ? "" : report;
+}
+
+}  // namespace
+
+absl::Status CheckSameRun(const Config& before, const Config& now) {
+  const std::string differing = Differences(Identity(before), Identity(now));
+  if (differing.empty()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("these fields differ from its config.textproto (before -> now):\n", differing,
+                   "Resume without the new values, or start a new run."));
+}
+
+Config OutcomeConfig(const Config& config) {
+  Config outcome = config;
   outcome.mutable_algorithm()->clear_threads();
   ReplayConfig* replay = outcome.mutable_replay();
   replay->clear_address();
@@ -45,36 +61,11 @@ absl::StatusOr<Config> Outcome(const Config& config) {
   learner->clear_keep_checkpoints();
   outcome.mutable_launch()->clear_max_restarts();
   outcome.mutable_launch()->clear_restart_window_s();
-  return outcome;
-}
-
-// What differs between two messages of one type, as "path: before -> now" lines.
-std::string Differences(const google::protobuf::Message& before, const google::protobuf::Message& now) {
-  google::protobuf::util::MessageDifferencer differencer;
-  differencer.set_message_field_comparison(google::protobuf::util::MessageDifferencer::EQUIVALENT);
-  std::string report;
-  differencer.ReportDifferencesToString(&report);
-  return differencer.Compare(before, now) ? "" : report;
-}
-
-}  // namespace
-
-absl::Status CheckSameRun(const Config& before, const Config& now) {
-  ASSIGN_OR_RETURN(const Config a, Identity(before));
-  ASSIGN_OR_RETURN(const Config b, Identity(now));
-  const std::string differing = Differences(a, b);
-  if (differing.empty()) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("these fields differ from its config.textproto (before -> now):\n", differing,
-                   "Resume without the new values, or start a new run."));
+  return WithDefaults(outcome);
 }
 
 std::string DifferencesOfOutcome(const Config& before, const Config& now) {
-  const absl::StatusOr<Config> a = Outcome(before), b = Outcome(now);
-  for (const auto* config : {&a, &b}) {
-    if (!config->ok()) return absl::StrCat(std::string(config->status().message()), "\n");
-  }
-  return Differences(*a, *b);
+  return Differences(OutcomeConfig(before), OutcomeConfig(now));
 }
 
 }  // namespace dbr

@@ -1,4 +1,4 @@
-// Whether two configs are of one run.
+// Whether two configs are of one run, and whether they come to the same.
 #pragma once
 
 #include <string>
@@ -11,10 +11,15 @@ namespace dbr {
 // InvalidArgument, naming every field that differs, unless a run of `before` can go on under `now`.
 absl::Status CheckSameRun(const Config& before, const Config& now);
 
-// The fields, limits and evaluation among them, by which what comes of a run of `now` could differ from what
-// came of `before`: a line each, "modified: replay.capacity: 5000 -> 6000"; empty where there is none.
-// Defaults count as if they were written out; addresses, threads, restarts, how often checkpoints are made
-// and in which folder the seed buffer lies do not count.
+// What of a config decides what comes of a run: `config` with its defaults filled in (WithDefaults), and at
+// their defaults the fields that change nothing. These are addresses and whether they may be insecure,
+// threads, restarts, how often checkpoints are made and how many are kept, and of the seed buffer's path all
+// but the file's name. Two runs on one kind of machine may be taken together where these are equal but for
+// the random seed.
+Config OutcomeConfig(const Config& config);
+
+// The fields in which the OutcomeConfigs of two configs differ, limits and evaluation among them: a line
+// each, "modified: replay.capacity: 5000 -> 6000"; empty where there is none.
 std::string DifferencesOfOutcome(const Config& before, const Config& now);
 
 }  // namespace dbr

@@ -8,6 +8,7 @@
 #include "absl/strings/str_format.h"
 #include "core/crc32c.h"
 #include "core/status_macros.h"
+#include "deploy/launch/same_run.h"
 #include "proto/config/config_file.h"
 #include "proto/config/config_text.h"
 
@@ -57,24 +58,21 @@ void AppendDifferences(const Message& message, const Message& defaults, const st
   }
 }
 
-// The effective config of an empty one.
+// The empty config with its defaults filled in.
 const Config& DefaultConfig() {
-  static const auto* config = new Config(ParseConfig(PrintConfig(Config())).value());
+  static const auto* config = new Config(WithDefaults(Config()));
   return *config;
 }
 
 }  // namespace
 
 Settings SettingsOf(const Config& config) {
-  Config seedless = config;
-  seedless.clear_seed();
-  const std::string data = seedless.replay().seed_buffer().path();
-  if (!data.empty())
-    seedless.mutable_replay()->mutable_seed_buffer()->set_path(data.substr(data.rfind('/') + 1));
-  const std::string effective = PrintConfig(seedless);
+  Config seedless = OutcomeConfig(config);
+  seedless.set_seed(DefaultConfig().seed());
+  const std::string text = PrintConfig(seedless);
   Settings settings;
   AppendDifferences(seedless, DefaultConfig(), "", &settings.differences);
-  settings.digest = absl::StrFormat("%08x", Crc32c(effective.data(), effective.size()));
+  settings.digest = absl::StrFormat("%08x", Crc32c(text.data(), text.size()));
   return settings;
 }
 

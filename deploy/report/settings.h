@@ -10,11 +10,10 @@ namespace dbr::report {
 
 struct Settings {
   // "path.to.field: value" for each field that is not at its schema's default, one a line, in the schema's
-  // order; without the seed, and of the offline data the file's name alone, for where it lies changes
-  // nothing.
+  // order; without the random seed and without what changes nothing (OutcomeConfig).
   std::string differences;
-  // CRC-32C of the effective config's text so taken, 8 hexadecimal digits: cells that differ in
-  // nothing but their seeds have the same.
+  // CRC-32C of the text of the OutcomeConfig without its random seed, 8 hexadecimal digits: runs with the
+  // same one differ in nothing else that could change what they come to.
   std::string digest;
 };
 

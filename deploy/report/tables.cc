@@ -143,8 +143,9 @@ void AddAblationTable(const Runs& runs, const std::vector<Row>& rows, const std:
 void AddCells(const Runs& runs, Document* document) {
   document->Add(Heading{2, "Cells"});
   document->Add(Paragraph{
-      "Config is a checksum of all of a run's settings but its seed: runs with the same one differ in "
-      "nothing else. "
+      "Config is a checksum of a run's settings but its seed and what cannot change its results (threads, "
+      "addresses, restarts, checkpoints, the folder of its data): runs with the same one differ in nothing "
+      "else. "
       "Steps and games are those of the actors; time is wall-clock time with the final evaluation."});
   AddFailures(runs, document);
   Table table;

@@ -197,9 +197,21 @@ TEST(SettingsTest, WhereTheOfflineDataLiesChangesNothing) {
   Config config;
   config.mutable_replay()->mutable_seed_buffer()->set_path("/here/hopper-medium.hdf5");
   const Settings here = SettingsOf(config);
-  EXPECT_EQ(here.differences, "replay.seed_buffer.path: \"hopper-medium.hdf5\"\n");
+  EXPECT_EQ(here.differences, "algorithm.dbr {}\nreplay.seed_buffer.path: \"hopper-medium.hdf5\"\n");
   config.mutable_replay()->mutable_seed_buffer()->set_path("hopper-medium.hdf5");
   EXPECT_EQ(SettingsOf(config).digest, here.digest);
+}
+
+TEST(SettingsTest, WhatCannotChangeTheResultsIsNotListed) {
+  Config config;
+  config.mutable_algorithm()->mutable_sac()->set_target_entropy(-2);
+  const Settings plain = SettingsOf(config);
+  EXPECT_EQ(plain.differences, "algorithm.sac.target_entropy: -2\n");
+  config.mutable_algorithm()->set_threads(1);
+  config.mutable_replay()->set_address("unix:/elsewhere/replay.sock");
+  config.mutable_learner()->set_checkpoint_every_s(1);
+  EXPECT_EQ(SettingsOf(config).differences, plain.differences);
+  EXPECT_EQ(SettingsOf(config).digest, plain.digest);
 }
 
 TEST(SettingsTest, NamesAnAlgorithmThatIsAllAtItsDefaults) {
