@@ -10,6 +10,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
+#include "actor/policy_fit.h"
 #include "actor/vector_env.h"
 #include "core/rng.h"
 #include "core/status_macros.h"
@@ -68,20 +69,12 @@ class GroupPlayer {
     if (!options_.opponent.empty()) env_options.opponents.push_back(options_.opponent);
     ASSIGN_OR_RETURN(const std::unique_ptr<VectorEnv> envs,
                      VectorEnv::Create(env_options, kEvaluationColumns));
-    RETURN_IF_ERROR(CheckFits(envs->spec()));
+    RETURN_IF_ERROR(CheckPolicyFits(policy_.spec(), envs->spec()));
     PolicyRunner runner;
     for (int group = next_group_++; group < group_count(); group = next_group_++) {
       RETURN_IF_ERROR(PlayGroup(group, envs.get(), &runner));
     }
     return absl::OkStatus();
-  }
-
-  absl::Status CheckFits(const EnvSpec& env) const {
-    PolicySpec expected = policy_.spec();
-    expected.env = env.name;
-    expected.observation_size = env.observation_size;
-    expected.actions = env.actions;
-    return CheckSameSpec(expected, policy_.spec());
   }
 
   absl::Status PlayGroup(int group, VectorEnv* envs, PolicyRunner* runner) {

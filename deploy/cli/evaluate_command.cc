@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "actor/evaluation_loop.h"
 #include "actor/evaluator.h"
+#include "actor/policy_fit.h"
 #include "core/rng.h"
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
@@ -40,11 +41,7 @@ struct EvaluateFlags {
 // Films the first episode of the evaluation with that seed.
 absl::StatusOr<int> RunFilm(const EvaluateFlags& flags, const PolicyNetworks& policy, ActingMode mode) {
   ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv({.name = policy.spec().env, .opponents = {}}));
-  PolicySpec expected = policy.spec();
-  expected.env = env->spec().name;
-  expected.observation_size = env->spec().observation_size;
-  expected.actions = env->spec().actions;
-  RETURN_IF_ERROR(CheckSameSpec(expected, policy.spec()));
+  RETURN_IF_ERROR(CheckPolicyFits(policy.spec(), env->spec()));
   const auto column = [](auto span) {
     return Eigen::Map<const MatrixX<float>>(span.data(), static_cast<Eigen::Index>(span.size()), 1);
   };

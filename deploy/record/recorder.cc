@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
+#include "actor/policy_fit.h"
 #include "actor/vector_env.h"
 #include "core/rng.h"
 #include "core/status_macros.h"
@@ -29,14 +30,6 @@ using Group = std::vector<EpisodeRows>;
 int GroupSize(std::int64_t steps, int max_episode_steps) {
   const std::int64_t episodes = steps / std::max(1, max_episode_steps);
   return static_cast<int>(std::clamp<std::int64_t>(episodes / kGroupsWanted, kMinGroup, kMaxGroup));
-}
-
-absl::Status CheckFits(const PolicyNetworks& policy, const EnvSpec& env) {
-  PolicySpec expected = policy.spec();
-  expected.env = env.name;
-  expected.observation_size = env.observation_size;
-  expected.actions = env.actions;
-  return CheckSameSpec(expected, policy.spec());
 }
 
 // One thread's environments, which play group after group.
@@ -218,7 +211,7 @@ absl::Status RecordEpisodes(const RecordOptions& options, const RecordSinks& sin
                                                    env->spec().name,
                                                    "; offline data holds no legal-action masks"));
   }
-  if (options.policy != nullptr) RETURN_IF_ERROR(CheckFits(*options.policy, env->spec()));
+  if (options.policy != nullptr) RETURN_IF_ERROR(CheckPolicyFits(options.policy->spec(), env->spec()));
   Recording recording(options, GroupSize(options.steps, env->spec().max_episode_steps));
   for (std::int64_t left = options.steps; left > 0;) {
     if (cancelled) return absl::CancelledError("the recording was stopped");
