@@ -34,10 +34,10 @@ TEST(EvaluatorTest, ResultsDoNotDependOnTheNumberOfThreads) {
 }
 
 TEST(EvaluatorTest, AgreesWithEpisodesPlayedOneByOneFromTheirSeeds) {
-  constexpr std::uint64_t kSeedBuffer = 5;
+  constexpr std::uint64_t kSeed = 5;
   const auto policy = UntrainedPolicy(Connect4Spec(), 2);
   const EvaluationOptions options = {
-      .opponent = "one_ply", .episodes = kEpisodes, .seed = kSeedBuffer, .mode = MODE};
+      .opponent = "one_ply", .episodes = kEpisodes, .seed = kSeed, .mode = MODE};
   const EvaluationResult together = Evaluate(*policy, options).value();
 
   const auto alone = VectorEnv::Create({.name = "connect4", .opponents = {"one_ply"}}, 1).value();
@@ -46,7 +46,7 @@ TEST(EvaluatorTest, AgreesWithEpisodesPlayedOneByOneFromTheirSeeds) {
   MatrixX<float> action(1, 1);
   std::vector<double> scores, returns, lengths;
   for (int k = 0; k < kEpisodes; ++k) {
-    alone->Reset(0, kSeedBuffer * (1 << 20) + k);
+    alone->Reset(0, kSeed * (1 << 20) + k);
     EXPECT_EQ(alone->observations().sum(), k % 2) << "the agent starts where the seed is even";
     lengths.push_back(0);
     do {

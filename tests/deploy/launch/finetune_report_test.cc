@@ -1,4 +1,4 @@
-// What a launch tells of robots, seeds and phases.
+// What a launch tells of robots, seed buffers and phases.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -186,7 +186,7 @@ TEST(RobotResultsTest, TheSummaryHoldsTheCurveAndThePhases) {
   EXPECT_THAT(read.Update(Evaluated(Sample(3100, 1600), 3, 3000, 1500)), IsEmpty()) << "known from before";
 }
 
-TEST(SeedBufferStatsTest, TellOfTheSharesOfTheSeed) {
+TEST(SeedBufferStatsTest, TellOfItsShares) {
   StatsReply stats = *Sample(0, 25).replay;
   stats.set_total(100);
   stats.set_plus(40);
