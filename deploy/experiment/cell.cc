@@ -13,6 +13,7 @@
 #include "core/status_macros.h"
 #include "deploy/launch/run_plan.h"
 #include "deploy/launch/same_run.h"
+#include "deploy/launch/summary_reader.h"
 #include "deploy/terminal/terminal.h"
 #include "proto/config/config_file.h"
 
@@ -41,12 +42,11 @@ bool InUse(const RunFolder& folder) {
   return absl::IsFailedPrecondition(RunFolderLock::Take(folder).status());
 }
 
-CellState StateOf(const RunSummary& summary, const RunFolder& folder) {
-  const std::string& ended = summary.ended;
-  const bool at_a_limit = !ended.empty() && ended != "running" && ended != "interrupted" && ended != "failed";
-  if (at_a_limit && !summary.final_results.empty()) return CellState::kDone;
+CellState StateIn(const RunFolder& folder, const RunSummary& summary) {
+  const RunState run = StateOf(summary);
+  if (run == RunState::kDone) return CellState::kDone;
   if (!Exists(folder.replay_store())) return CellState::kNew;
-  return ended == "failed" ? CellState::kFailed : CellState::kInterrupted;
+  return run == RunState::kFailed ? CellState::kFailed : CellState::kInterrupted;
 }
 
 absl::Status MakeFolders(const fs::path& path) {
@@ -74,7 +74,7 @@ CellStanding ReadStanding(const Cell& cell) {
   } else if (!standing.difference.empty()) {
     standing.state = CellState::kChanged;
   } else {
-    standing.state = StateOf(standing.summary, folder);
+    standing.state = StateIn(folder, standing.summary);
   }
   return standing;
 }

@@ -8,7 +8,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "deploy/experiment/grid.h"
-#include "deploy/launch/results.h"
+#include "deploy/launch/run_summary.h"
 
 namespace dbr {
 

@@ -34,8 +34,8 @@ Limit NearestLimit(const Config& config, const RunSummary& summary) {
 }
 
 std::string Phase(const Config& config, const RunSummary& summary) {
-  if (summary.ended == "interrupted") return "saving";
-  if (summary.ended != "running") return "evaluating";
+  if (summary.ended == RunEnding::kInterrupted) return "saving";
+  if (summary.ended != RunEnding::kRunning) return "evaluating";
   if (config.learner().offline_updates() == 0) return "training";
   return summary.updates < config.learner().offline_updates() && summary.transitions == 0 ? "offline"
                                                                                           : "online";
@@ -56,7 +56,7 @@ std::array<std::string, 3> Kinds(const Cell& cell) {
 
 CellProgress ProgressOf(const Config& config, const RunSummary& summary) {
   CellProgress progress;
-  if (summary.ended.empty()) {
+  if (summary.ended == RunEnding::kNone) {
     progress.phase = "starting";
     return progress;
   }

@@ -7,7 +7,7 @@
 
 #include "absl/time/time.h"
 #include "deploy/experiment/grid.h"
-#include "deploy/launch/results.h"
+#include "deploy/launch/run_summary.h"
 
 namespace dbr {
 

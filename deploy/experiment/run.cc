@@ -9,6 +9,7 @@
 #include "absl/time/clock.h"
 #include "core/run_folder.h"
 #include "core/status_macros.h"
+#include "deploy/launch/summary_reader.h"
 #include "deploy/process/child_process.h"
 #include "deploy/process/interrupt.h"
 #include "deploy/process/log_tail.h"

@@ -14,6 +14,8 @@
 #include "core/status_macros.h"
 #include "deploy/launch/commit.h"
 #include "deploy/launch/result_tables.h"
+#include "deploy/launch/results.h"
+#include "deploy/launch/summary_reader.h"
 #include "deploy/process/interrupt.h"
 #include "deploy/terminal/terminal.h"
 #include "nn/policy.h"
@@ -37,8 +39,8 @@ SupervisorOptions OptionsOf(const LaunchConfig& config) {
 
 // Why a run ended, for people.
 std::string Reason(const RunSummary& summary) {
-  if (summary.ended == "interrupted") return "stopped by a signal";
-  return absl::StrCat("reached ", summary.ended);
+  if (summary.ended == RunEnding::kInterrupted) return "stopped by a signal";
+  return absl::StrCat("reached ", TextOf(summary.ended));
 }
 
 const char* EpisodesWord(const EnvSpec& env) {
@@ -86,7 +88,7 @@ Launch::Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_p
   summary_.seed_buffer.path = plan_.config.replay().seed_buffer().path();
   summary_.offline_updates = plan_.config.learner().offline_updates();
   summary_.every_updates = plan_.config.evaluation().every_updates();
-  summary_.ended = "running";
+  summary_.ended = RunEnding::kRunning;
   summary_.failure.clear();
   summary_.final_results.clear();
   ++summary_.launches;
@@ -101,7 +103,7 @@ absl::StatusOr<int> Launch::Run() {
   if (status.ok()) Say("stopping, and saving everything");
   const bool saved = StopAll(/*ask=*/status.ok());
   if (!status.ok()) {
-    summary_.ended = "failed";
+    summary_.ended = RunEnding::kFailed;
     summary_.failure = std::string(status.message());
     log_->error("{}", summary_.failure);
     SaveSummary();
@@ -113,7 +115,7 @@ absl::StatusOr<int> Launch::Run() {
       WithCommas(summary_.transitions), " transitions, ", WithCommas(summary_.updates), " updates in ",
       Clock(absl::Seconds(summary_.training_s)),
       saved ? "; all is saved" : absl::StrCat("; NOT all could be saved, see ", plan_.folder.log("launch"))));
-  bool interrupted = summary_.ended == "interrupted";
+  bool interrupted = summary_.ended == RunEnding::kInterrupted;
   if (!interrupted) RETURN_IF_ERROR(FinalEvaluation(&interrupted));
   if (interrupted) {
     Say(absl::StrCat("no final table; it comes with: dbr evaluate --policy ", plan_.folder.root,

@@ -16,8 +16,8 @@
 #include "deploy/launch/health.h"
 #include "deploy/launch/monitor.h"
 #include "deploy/launch/progress.h"
-#include "deploy/launch/results.h"
 #include "deploy/launch/run_plan.h"
+#include "deploy/launch/run_summary.h"
 #include "deploy/process/supervisor.h"
 
 namespace dbr {
@@ -44,7 +44,8 @@ class Launch {
   absl::Status Train();
   void Observe(absl::Time now);
   // Which of the config's limits the run has come to; empty: none.
-  std::string LimitReached(const RunSample& sample, const std::vector<EvaluationPoint>& evaluations) const;
+  std::optional<RunEnding> LimitReached(const RunSample& sample,
+                                        const std::vector<EvaluationPoint>& evaluations) const;
   bool OfflinePhaseIsOver(const RunSample& sample) const;
   std::optional<absl::Duration> TimeLeft(const RunSample& sample) const;
 

@@ -24,7 +24,7 @@ absl::Status Launch::Train() {
   while (supervisor_->stop_signals() == 0) {
     const absl::Time now = absl::Now();
     Observe(now);
-    if (summary_.ended != "running") return absl::OkStatus();
+    if (summary_.ended != RunEnding::kRunning) return absl::OkStatus();
     if (!acting_ && OfflinePhaseIsOver(monitor_->Latest())) {
       Say(absl::StrCat("offline phase over after ", WithCommas(summary_.updates), " updates: starting ",
                        plan_.actors, plan_.actors == 1 ? " actor" : " actors"));
@@ -35,7 +35,7 @@ absl::Status Launch::Train() {
     if (limit > 0) deadline = now + absl::Seconds(limit - summary_.training_s);
     RETURN_IF_ERROR(supervisor_->Wait(deadline));
   }
-  summary_.ended = "interrupted";
+  summary_.ended = RunEnding::kInterrupted;
   return absl::OkStatus();
 }
 
@@ -52,7 +52,7 @@ void Launch::Observe(absl::Time now) {
   const std::vector<EvaluationPoint> evaluations = summary_.Update(sample);
   summary_.training_s = before_.training_s + absl::ToDoubleSeconds(now - training_since_);
   summary_.restarts = before_.restarts + supervisor_->restarts();
-  if (const std::string limit = LimitReached(sample, evaluations); !limit.empty()) summary_.ended = limit;
+  if (const auto limit = LimitReached(sample, evaluations)) summary_.ended = *limit;
   if (sample.replay.has_value()) {
     line_.Update({.sample = sample,
                   .left = TimeLeft(sample),
@@ -65,16 +65,18 @@ void Launch::Observe(absl::Time now) {
   SaveSummary();
 }
 
-std::string Launch::LimitReached(const RunSample& sample,
-                                 const std::vector<EvaluationPoint>& evaluations) const {
+std::optional<RunEnding> Launch::LimitReached(const RunSample& sample,
+                                              const std::vector<EvaluationPoint>& evaluations) const {
   const LaunchConfig& limits = plan_.config.launch();
-  if (limits.max_seconds() > 0 && summary_.training_s >= limits.max_seconds()) return "max_seconds";
-  if (limits.max_episodes() > 0 && summary_.games >= limits.max_episodes()) return "max_episodes";
-  if (limits.max_steps() > 0 && summary_.transitions >= limits.max_steps()) return "max_steps";
+  if (limits.max_seconds() > 0 && summary_.training_s >= limits.max_seconds()) return RunEnding::kMaxSeconds;
+  if (limits.max_episodes() > 0 && summary_.games >= limits.max_episodes()) return RunEnding::kMaxEpisodes;
+  if (limits.max_steps() > 0 && summary_.transitions >= limits.max_steps()) return RunEnding::kMaxSteps;
   for (const EvaluationPoint& point : evaluations) {
-    if (limits.stop_at_return() != 0 && point.return_mean >= limits.stop_at_return()) return "stop_at_return";
+    if (limits.stop_at_return() != 0 && point.return_mean >= limits.stop_at_return())
+      return RunEnding::kStopAtReturn;
   }
-  return sample.learner.has_value() && sample.learner->finished() ? "max_updates" : "";
+  if (sample.learner.has_value() && sample.learner->finished()) return RunEnding::kMaxUpdates;
+  return std::nullopt;
 }
 
 // Nothing is known of how fast actors will be while they do not act.

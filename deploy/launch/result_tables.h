@@ -5,7 +5,7 @@
 
 #include "absl/types/span.h"
 #include "actor/evaluator.h"
-#include "deploy/launch/results.h"
+#include "deploy/launch/run_summary.h"
 
 namespace dbr {
 

@@ -2,11 +2,10 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <utility>
+#include <optional>
 
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
-#include "deploy/launch/summary_reader.h"
 
 namespace dbr {
 namespace {
@@ -89,48 +88,18 @@ std::string ResultsPath(const RunFolder& folder) {
   return absl::StrCat(folder.root, "/results.txt");
 }
 
-std::vector<EvaluationPoint> RunSummary::Update(const RunSample& sample) {
-  if (sample.replay.has_value()) {
-    const StatsReply& replay = *sample.replay;
-    games = replay.episodes();
-    transitions = replay.inserted();
-    seed_buffer.rows = replay.seed_buffer_rows();
-    seed_buffer.bad_rows = replay.seed_buffer_bad_rows();
-    seed_buffer.episodes = replay.seed_buffer_episodes();
-    seed_buffer.return_mean = replay.seed_buffer_return_mean();
-    seed_buffer.return_std = replay.seed_buffer_return_std();
-    seed_buffer.return_min = replay.seed_buffer_return_min();
-    seed_buffer.return_max = replay.seed_buffer_return_max();
-    seed_buffer.rows_per_second = replay.seed_buffer_rows_per_second();
-  }
-  if (sample.learner.has_value()) {
-    updates = sample.learner->updates();
-    policy_version = sample.learner->policy_version();
-  }
-  return curve.Update(sample);
-}
-
-std::optional<EvaluationPoint> RunSummary::AfterOffline() const {
-  return offline_updates > 0 ? curve.AfterOffline(offline_updates) : std::nullopt;
-}
-
-std::set<std::uint64_t> RunSummary::SkippedIterations() const {
-  std::set<std::uint64_t> skipped = curve.skipped();
-  if (every_updates == 0 || ended == "running") return skipped;
-  const std::optional<std::uint64_t> last = curve.LastIteration();
-  for (std::uint64_t k = last.has_value() ? *last + 1 : 0; k < updates / every_updates; ++k)
-    skipped.insert(k);
-  return skipped;
-}
-
 absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder) {
   Json evaluations = Json::array();
   for (const EvaluationPoint& point : summary.curve.points()) evaluations.push_back(ToJson(point));
   Json final_results = Json::array();
   for (const EvaluationResult& result : summary.final_results) final_results.push_back(ToJson(result));
-  Json json = {{"env", summary.env},       {"algorithm", summary.algorithm}, {"seed", summary.seed},
-               {"config", summary.config}, {"commit", summary.commit},       {"run_folder", folder.root},
-               {"ended", summary.ended}};
+  Json json = {{"env", summary.env},
+               {"algorithm", summary.algorithm},
+               {"seed", summary.seed},
+               {"config", summary.config},
+               {"commit", summary.commit},
+               {"run_folder", folder.root},
+               {"ended", std::string(TextOf(summary.ended))}};
   if (!summary.failure.empty()) json["failure"] = summary.failure;
   if (summary.seed_buffer.rows > 0) {
     json["seed_buffer"] = SeedBufferJson(summary.seed_buffer);
@@ -151,14 +120,6 @@ absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder) {
   // Paths and logs may hold bytes that are not UTF-8.
   const std::string text = json.dump(2, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace);
   return WriteFileAtomically(folder.summary(), absl::StrCat(text, "\n"));
-}
-
-RunSummary ReadSummary(const RunFolder& folder) {
-  absl::StatusOr<RunSummary> earlier = LoadSummary(folder);
-  RunSummary summary;
-  if (earlier.ok()) summary = *std::move(earlier);
-  summary.seed_buffer = SeedBufferSummary();
-  return summary;
 }
 
 }  // namespace dbr

@@ -93,6 +93,20 @@ SeedBufferSummary ReadSeedBuffer(const Json& json) {
           .rows_per_second = Real(json, "rows_per_second", kNaN)};
 }
 
+// Empty where the text is no object or does not say it.
+std::optional<RunEnding> ReadEnding(const Json& json) {
+  if (!json.is_object() || !json.contains("ended") || !json["ended"].is_string()) return std::nullopt;
+  return ParseRunEnding(json["ended"].get<std::string>());
+}
+
+std::string FoundInPlaceOfEnding(const Json& json) {
+  if (json.is_discarded()) return "found text that is no JSON";
+  const bool says_something = json.is_object() && json.contains("ended");
+  return says_something
+             ? absl::StrCat("found ", json["ended"].dump(-1, ' ', false, Json::error_handler_t::replace))
+             : "found none";
+}
+
 void ReadCounters(const Json& json, RunSummary* summary) {
   summary->wall_s = Real(json, "wall_s", 0);
   summary->training_s = Real(json, "training_s", 0);
@@ -109,14 +123,14 @@ void ReadCounters(const Json& json, RunSummary* summary) {
 absl::StatusOr<RunSummary> LoadSummary(const RunFolder& folder) {
   ASSIGN_OR_RETURN(const std::string text, ReadFile(folder.summary()));
   const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object() || !json.contains("ended")) {
+  const std::optional<RunEnding> ended = ReadEnding(json);
+  if (!ended.has_value()) {
     return absl::DataLossError(
         absl::StrCat(folder.summary(), " is damaged: expected a JSON object that says how the run 'ended', ",
-                     json.is_discarded() ? "found text that is no JSON" : "found none",
-                     ". Run the cell again, or restore the file."));
+                     FoundInPlaceOfEnding(json), ". Run the cell again, or restore the file."));
   }
   RunSummary summary;
-  summary.ended = Text(json, "ended");
+  summary.ended = *ended;
   summary.env = Text(json, "env");
   summary.algorithm = Text(json, "algorithm");
   summary.seed = Count(json, "seed");
@@ -135,6 +149,14 @@ absl::StatusOr<RunSummary> LoadSummary(const RunFolder& folder) {
   for (const Json& result : Part(json, "final")) {
     if (result.is_object()) summary.final_results.push_back(ReadResult(result));
   }
+  return summary;
+}
+
+RunSummary ReadSummary(const RunFolder& folder) {
+  absl::StatusOr<RunSummary> earlier = LoadSummary(folder);
+  RunSummary summary;
+  if (earlier.ok()) summary = *std::move(earlier);
+  summary.seed_buffer = SeedBufferSummary();
   return summary;
 }
 

@@ -62,10 +62,18 @@ Cell CellAt(int task, int contender, std::uint64_t seed) {
   return cell;
 }
 
-CellState StateOf(const RunSummary& summary) {
-  if (summary.ended.empty() || summary.ended == "running") return CellState::kRunning;
-  if (summary.ended == "failed") return CellState::kFailed;
-  if (summary.ended == "interrupted" || summary.final_results.empty()) return CellState::kStopped;
+CellState CellStateOf(RunState run) {
+  switch (run) {
+    case RunState::kNotBegun:
+    case RunState::kRunning:
+      return CellState::kRunning;
+    case RunState::kInterrupted:
+      return CellState::kStopped;
+    case RunState::kFailed:
+      return CellState::kFailed;
+    case RunState::kDone:
+      break;
+  }
   return CellState::kDone;
 }
 
@@ -73,7 +81,7 @@ void ReadSummaryOf(Cell* cell, std::vector<std::string>* notes) {
   absl::StatusOr<RunSummary> summary = LoadSummary(RunFolder{cell->folder});
   if (summary.ok()) {
     cell->summary = *std::move(summary);
-    cell->state = StateOf(cell->summary);
+    cell->state = CellStateOf(StateOf(cell->summary));
     cell->failure = cell->summary.failure;
     return;
   }

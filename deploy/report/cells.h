@@ -7,7 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
-#include "deploy/launch/results.h"
+#include "deploy/launch/run_summary.h"
 #include "proto/experiment.pb.h"
 
 namespace dbr::report {

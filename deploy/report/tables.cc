@@ -73,13 +73,14 @@ std::vector<TableCell> CellLine(const Runs& runs, const Cell& cell, bool first_o
   std::vector<std::string> texts = {first_of_task ? runs.grid.task(cell.task).name() : "",
                                     runs.grid.contender(cell.contender).name(), absl::StrCat(cell.seed),
                                     NameOf(cell.state)};
-  if (summary.ended.empty()) {
+  if (summary.ended == RunEnding::kNone) {
     texts.resize(11, "–");
   } else {
-    texts.insert(texts.end(), {summary.ended, summary.commit.empty() ? "–" : summary.commit.substr(0, 12),
-                               Clock(absl::Seconds(summary.wall_s)), WithCommas(summary.updates),
-                               WithCommas(summary.transitions), WithCommas(summary.games),
-                               cell.digest.empty() ? "–" : cell.digest});
+    texts.insert(
+        texts.end(),
+        {std::string(TextOf(summary.ended)), summary.commit.empty() ? "–" : summary.commit.substr(0, 12),
+         Clock(absl::Seconds(summary.wall_s)), WithCommas(summary.updates), WithCommas(summary.transitions),
+         WithCommas(summary.games), cell.digest.empty() ? "–" : cell.digest});
   }
   std::vector<TableCell> line;
   for (std::string& text : texts) line.push_back({std::move(text)});

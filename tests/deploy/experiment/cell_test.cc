@@ -9,6 +9,7 @@
 
 #include "core/file_io.h"
 #include "core/run_folder.h"
+#include "deploy/launch/results.h"
 #include "deploy/launch/run_plan.h"
 #include "proto/config/config_file.h"
 #include "tests/support/temp_dir.h"
@@ -32,7 +33,7 @@ class CellTest : public testing::Test {
   }
 
   // A run of `config` whose last launch ended so, its store still there.
-  void MakeRun(const Config& config, const std::string& ended, bool with_results = false) {
+  void MakeRun(const Config& config, RunEnding ended, bool with_results = false) {
     std::filesystem::create_directories(run().checkpoints());
     std::filesystem::create_directories(run().policies());
     for (const auto& [path, contents] :
@@ -63,7 +64,7 @@ TEST_F(CellTest, WithoutAFolderIsNew) {
 }
 
 TEST_F(CellTest, AtItsLimitWithFinalResultsIsDone) {
-  MakeRun(cell_.config, "max_episodes", /*with_results=*/true);
+  MakeRun(cell_.config, RunEnding::kMaxEpisodes, /*with_results=*/true);
   const CellStanding standing = ReadStanding(cell_);
   EXPECT_EQ(standing.state, CellState::kDone);
   EXPECT_EQ(standing.summary.wall_s, 12);
@@ -71,24 +72,24 @@ TEST_F(CellTest, AtItsLimitWithFinalResultsIsDone) {
 }
 
 TEST_F(CellTest, AtItsLimitWithoutFinalResultsGoesOn) {
-  MakeRun(cell_.config, "max_episodes");
+  MakeRun(cell_.config, RunEnding::kMaxEpisodes);
   EXPECT_EQ(State(), CellState::kInterrupted) << "it was stopped in the final evaluation";
 }
 
 TEST_F(CellTest, StoppedOrKilledGoesOn) {
-  MakeRun(cell_.config, "interrupted");
+  MakeRun(cell_.config, RunEnding::kInterrupted);
   EXPECT_EQ(State(), CellState::kInterrupted);
-  MakeRun(cell_.config, "running");
+  MakeRun(cell_.config, RunEnding::kRunning);
   EXPECT_EQ(State(), CellState::kInterrupted) << "its launcher was killed";
 }
 
 TEST_F(CellTest, FailedGoesOnToo) {
-  MakeRun(cell_.config, "failed");
+  MakeRun(cell_.config, RunEnding::kFailed);
   EXPECT_EQ(State(), CellState::kFailed);
 }
 
 TEST_F(CellTest, WithoutAStoreThereIsNothingToGoOnWith) {
-  MakeRun(cell_.config, "interrupted");
+  MakeRun(cell_.config, RunEnding::kInterrupted);
   std::filesystem::remove(run().replay_store());
   EXPECT_EQ(State(), CellState::kNew);
 }
@@ -97,7 +98,7 @@ TEST_F(CellTest, OfAnotherConfigIsNamedFieldByField) {
   Config other = cell_.config;
   other.mutable_replay()->set_capacity(6000);
   other.mutable_launch()->set_max_episodes(11);
-  MakeRun(other, "max_episodes", /*with_results=*/true);
+  MakeRun(other, RunEnding::kMaxEpisodes, /*with_results=*/true);
   const CellStanding standing = ReadStanding(cell_);
   EXPECT_EQ(standing.state, CellState::kChanged);
   EXPECT_THAT(standing.difference,
@@ -106,7 +107,7 @@ TEST_F(CellTest, OfAnotherConfigIsNamedFieldByField) {
 }
 
 TEST_F(CellTest, AConfigThatNobodyCanReadIsAnotherOne) {
-  MakeRun(cell_.config, "interrupted");
+  MakeRun(cell_.config, RunEnding::kInterrupted);
   ASSERT_TRUE(WriteFileAtomically(run().config(), "nonsense: 1").ok());
   const CellStanding standing = ReadStanding(cell_);
   EXPECT_EQ(standing.state, CellState::kChanged);
@@ -122,14 +123,14 @@ TEST_F(CellTest, FieldsWithoutInfluenceAndWrittenDefaultsMakeNoOtherConfig) {
   other.mutable_algorithm()->mutable_dbr()->set_epsilon(0.05);  // the default
   other.mutable_replay()->mutable_seed_buffer()->set_path("/other/folder/hopper.hdf5");
   cell_.config.mutable_replay()->mutable_seed_buffer()->set_path("/folder/hopper.hdf5");
-  MakeRun(other, "max_episodes", /*with_results=*/true);
+  MakeRun(other, RunEnding::kMaxEpisodes, /*with_results=*/true);
   EXPECT_EQ(State(), CellState::kDone) << ReadStanding(cell_).difference;
   cell_.config.mutable_replay()->mutable_seed_buffer()->set_path("/folder/walker.hdf5");
   EXPECT_THAT(ReadStanding(cell_).difference, HasSubstr("\"hopper.hdf5\" -> \"walker.hdf5\""));
 }
 
 TEST_F(CellTest, AtWhichAnotherLaunchIsAtWorkIsBusy) {
-  MakeRun(cell_.config, "running");
+  MakeRun(cell_.config, RunEnding::kRunning);
   const auto lock = RunFolderLock::Take(run());
   ASSERT_TRUE(lock.ok()) << lock.status();
   EXPECT_EQ(State(), CellState::kBusy);
@@ -146,7 +147,7 @@ TEST_F(CellTest, IsPreparedWithItsWholeConfigBesideTheFolder) {
 TEST_F(CellTest, MovesAsideWithItsLogAndDeletesNothing) {
   EXPECT_THAT(MoveAside(cell_, folder_.path()).value(), IsEmpty());
   for (const char* number : {"1", "2"}) {
-    MakeRun(cell_.config, "interrupted");
+    MakeRun(cell_.config, RunEnding::kInterrupted);
     ASSERT_TRUE(WriteFileAtomically(cell_.log(), number).ok());
     const auto moved = MoveAside(cell_, folder_.path());
     ASSERT_TRUE(moved.ok()) << moved.status();
@@ -159,7 +160,7 @@ TEST_F(CellTest, MovesAsideWithItsLogAndDeletesNothing) {
 }
 
 TEST_F(CellTest, LosesOnlyWhatContinuingNeeds) {
-  MakeRun(cell_.config, "max_episodes", /*with_results=*/true);
+  MakeRun(cell_.config, RunEnding::kMaxEpisodes, /*with_results=*/true);
   ASSERT_TRUE(RemoveStores(cell_).ok());
   EXPECT_FALSE(std::filesystem::exists(run().replay_store()));
   EXPECT_FALSE(std::filesystem::exists(run().checkpoints()));

@@ -106,7 +106,7 @@ TEST(CellProgressTest, GoesByTheNearestLimit) {
   RunSummary summary;
   EXPECT_EQ(ProgressOf(config, summary).phase, "starting");
   EXPECT_EQ(ProgressOf(config, summary).left, std::nullopt);
-  summary.ended = "running";
+  summary.ended = RunEnding::kRunning;
   summary.training_s = 20;
   summary.transitions = 500;
   CellProgress progress = ProgressOf(config, summary);
@@ -126,7 +126,7 @@ TEST(CellProgressTest, TellsThePhaseAndTheNewestEvaluation) {
   config.mutable_learner()->set_offline_updates(100);
   config.mutable_learner()->set_max_updates(1000);
   RunSummary summary;
-  summary.ended = "running";
+  summary.ended = RunEnding::kRunning;
   summary.updates = 50;
   EXPECT_EQ(ProgressOf(config, summary).phase, "offline");
   summary.updates = 100;
@@ -136,9 +136,9 @@ TEST(CellProgressTest, TellsThePhaseAndTheNewestEvaluation) {
   EXPECT_EQ(ProgressOf(config, summary).newest, "return 812.3");
   summary.curve = EvaluationCurve({{.opponent = "mcts:10", .score_mean = 0.625}});
   EXPECT_EQ(ProgressOf(config, summary).newest, "mcts:10 0.62");
-  summary.ended = "max_updates";
+  summary.ended = RunEnding::kMaxUpdates;
   EXPECT_EQ(ProgressOf(config, summary).phase, "evaluating");
-  summary.ended = "interrupted";
+  summary.ended = RunEnding::kInterrupted;
   EXPECT_EQ(ProgressOf(config, summary).phase, "saving");
 }
 

@@ -14,6 +14,7 @@
 #include "deploy/launch/progress.h"
 #include "deploy/launch/result_tables.h"
 #include "deploy/launch/results.h"
+#include "deploy/launch/summary_reader.h"
 #include "deploy/terminal/terminal.h"
 #include "tests/support/temp_dir.h"
 

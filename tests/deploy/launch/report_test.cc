@@ -15,6 +15,7 @@
 #include "deploy/launch/progress.h"
 #include "deploy/launch/result_tables.h"
 #include "deploy/launch/results.h"
+#include "deploy/launch/summary_reader.h"
 #include "deploy/terminal/terminal.h"
 #include "tests/support/temp_dir.h"
 
@@ -201,7 +202,7 @@ TEST(ResultsTest, SummaryKeepsItsCountersOverAResume) {
   sample.replay = SomeStats();
   sample.learner = SomeStatus();
   summary.Update(sample);
-  summary.ended = "interrupted";
+  summary.ended = RunEnding::kInterrupted;
   summary.config = "bad \xff byte";
   summary.commit = "abc+changes";
   summary.training_s = 12.5;
@@ -217,7 +218,7 @@ TEST(ResultsTest, SummaryKeepsItsCountersOverAResume) {
   EXPECT_EQ(read.training_s, 12.5);
   EXPECT_EQ(read.launches, 2);
   EXPECT_EQ(read.transitions, 123456);
-  EXPECT_EQ(read.ended, "interrupted");
+  EXPECT_EQ(read.ended, RunEnding::kInterrupted);
   EXPECT_EQ(read.commit, "abc+changes");
   ASSERT_EQ(read.final_results.size(), 1);
   EXPECT_EQ(ToJson(read.final_results[0]), ToJson(summary.final_results[0]));
@@ -228,7 +229,7 @@ TEST(ResultsTest, SummaryNamesTheIterationsThatWereNotEvaluated) {
   const RunFolder run{folder.path()};
   RunSummary summary;
   summary.every_updates = 1000;
-  summary.ended = "running";
+  summary.ended = RunEnding::kRunning;
   RunSample sample;
   sample.learner = SomeStatus();
   sample.learner->set_updates(9500);
@@ -242,7 +243,7 @@ TEST(ResultsTest, SummaryNamesTheIterationsThatWereNotEvaluated) {
   };
   EXPECT_EQ(written()["skipped_iterations"], Json({2, 4}));
   // Those that it had not come to; of the policy of the last one is the final evaluation.
-  summary.ended = "max_updates";
+  summary.ended = RunEnding::kMaxUpdates;
   const Json json = written();
   EXPECT_EQ(json["skipped_iterations"], Json({2, 4, 6, 7, 8}));
   EXPECT_EQ(json["evaluations"][0]["iteration"], 5);
@@ -258,6 +259,37 @@ TEST(ResultsTest, ADamagedSummaryCountsAsNone) {
   EXPECT_EQ(ReadSummary(run).launches, 0);
   ASSERT_TRUE(WriteFileAtomically(run.summary(), "{\"launches\": \"three\"}").ok());
   EXPECT_EQ(ReadSummary(run).launches, 0);
+}
+
+TEST(RunStateTest, TextsAreThoseOfTheSummary) {
+  for (const char* text : {"running", "interrupted", "failed", "max_seconds", "max_episodes", "max_steps",
+                           "max_updates", "stop_at_return"}) {
+    const auto ending = ParseRunEnding(text);
+    ASSERT_TRUE(ending.has_value()) << text;
+    EXPECT_EQ(TextOf(*ending), text);
+  }
+  EXPECT_EQ(TextOf(RunEnding::kNone), "");
+  EXPECT_FALSE(ParseRunEnding("max_minutes").has_value());
+}
+
+TEST(RunStateTest, AtALimitFinalResultsMakeARunDone) {
+  RunSummary summary;
+  EXPECT_EQ(StateOf(summary), RunState::kNotBegun);
+  summary.ended = RunEnding::kMaxSteps;
+  EXPECT_EQ(StateOf(summary), RunState::kInterrupted) << "in the final evaluation";
+  summary.final_results = {Against("random", 0.9)};
+  EXPECT_EQ(StateOf(summary), RunState::kDone);
+  summary.ended = RunEnding::kFailed;
+  EXPECT_EQ(StateOf(summary), RunState::kFailed);
+}
+
+TEST(ResultsTest, AnUnknownEndingIsDamageAndIsNamed) {
+  TempDir folder;
+  const RunFolder run{folder.path()};
+  ASSERT_TRUE(WriteFileAtomically(run.summary(), "{\"ended\": \"max_minutes\"}").ok());
+  const absl::Status status = LoadSummary(run).status();
+  EXPECT_TRUE(absl::IsDataLoss(status)) << status;
+  EXPECT_THAT(std::string(status.message()), HasSubstr("found \"max_minutes\""));
 }
 
 TEST(StatsReportTest, TextShowsEverything) {

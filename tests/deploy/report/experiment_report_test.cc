@@ -40,7 +40,7 @@ void WriteFakeRuns(const std::string& root) {
   }
   WriteFakeCell(root, "hopper-medium", "bear", FakeHopper(1000, 1));
   RunSummary running = FakeHopper(777, 2);
-  running.ended = "running";
+  running.ended = RunEnding::kRunning;
   running.final_results.clear();
   WriteFakeCell(root, "hopper-medium", "bear", running);
 }
@@ -95,9 +95,9 @@ TEST_F(ReportTest, TakesScoresTogetherButNoReturns) {
 TEST_F(ReportTest, NamesCellsThatAreNotDoneAndGivesNoFiguresOfThem) {
   WriteFakeExperiment(folder_ / "runs");
   RunSummary failed = FakeHopper(777, 1), running = FakeHopper(888, 2);
-  failed.ended = "failed";
+  failed.ended = RunEnding::kFailed;
   failed.failure = "the learner died 6 times";
-  running.ended = "running";
+  running.ended = RunEnding::kRunning;
   WriteFakeCell(folder_ / "runs", "hopper-medium", "dbr", failed);
   WriteFakeCell(folder_ / "runs", "hopper-medium", "dbr", running);
   EXPECT_EQ(Write().counts, "0 of 10 cells done, 1 running, 1 failed, 8 not run");

@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/check.h"
 #include "core/file_io.h"
+#include "deploy/launch/results.h"
 #include "proto/config/config_file.h"
 
 namespace dbr {
@@ -25,7 +26,7 @@ RunSummary Finished(std::uint64_t seed) {
   summary.seed = seed;
   summary.algorithm = "dbr";
   summary.commit = "0123456789abcdef0123456789abcdef01234567";
-  summary.ended = "max_updates";
+  summary.ended = RunEnding::kMaxUpdates;
   summary.wall_s = 3723;
   summary.updates = 30000;
   return summary;

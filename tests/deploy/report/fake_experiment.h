@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "deploy/launch/results.h"
+#include "deploy/launch/run_summary.h"
 
 namespace dbr {
 

@@ -1,0 +1,62 @@
+// What a run came to, over all of its launches: the content of its summary file.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "actor/evaluator.h"
+#include "deploy/launch/evaluation_curve.h"
+#include "deploy/launch/monitor.h"
+#include "deploy/launch/run_state.h"
+
+namespace dbr {
+
+// The seed buffer that the replay server holds. `rows` is 0 where there is none.
+struct SeedBufferSummary {
+  std::string path;            // as the config has it
+  std::uint64_t rows = 0;      // transitions that were loaded
+  std::uint64_t bad_rows = 0;  // rows with values that are not finite, which were left out
+  std::uint64_t episodes = 0;  // whole ones
+  double return_mean = 0, return_std = 0, return_min = 0, return_max = 0;  // of the whole episodes
+  double rows_per_second = 0;
+};
+
+// What summary.json holds. Counters and evaluations go on over --resume. A copyable value.
+struct RunSummary {
+  std::string env;
+  std::string algorithm;
+  std::uint64_t seed = 0;
+  std::string config;  // the file that the run was launched with
+  std::string commit;  // of the newest launch's programs (deploy/launch/commit.h)
+  RunEnding ended = RunEnding::kNone;
+  std::string failure;    // of a failed one
+  double wall_s = 0;      // from the start of the processes to their end, over all launches of the run
+  double training_s = 0;  // of that, with everything up
+  std::uint64_t launches = 0;
+  std::uint64_t games = 0;        // episodes that ended
+  std::uint64_t transitions = 0;  // of the actors
+  std::uint64_t updates = 0;
+  std::uint64_t policy_version = 0;
+  std::uint64_t restarts = 0;  // of processes that died
+  SeedBufferSummary seed_buffer;
+  std::uint64_t offline_updates = 0;  // that the config asks for
+  EvaluationCurve curve;              // during training
+  std::uint64_t every_updates = 0;    // of evaluations, that the config asks for; 0: by time
+  std::vector<EvaluationResult> final_results;
+
+  // Takes over the counters of the newest answers, and gives the evaluations that are new.
+  std::vector<EvaluationPoint> Update(const RunSample& sample);
+  // The iterations that no evaluation was made of: those that the evaluator skipped, and once training has
+  // ended those that it had not come to, but for the last one, whose policy the final evaluation is of.
+  std::set<std::uint64_t> SkippedIterations() const;
+  // See EvaluationCurve; empty without an offline phase.
+  std::optional<EvaluationPoint> AfterOffline() const;
+};
+
+// A run that came to a limit and has no final results was stopped in its final evaluation.
+RunState StateOf(const RunSummary& summary);
+
+}  // namespace dbr
