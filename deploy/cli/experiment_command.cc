@@ -12,6 +12,7 @@
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
 #include "deploy/experiment/cell.h"
+#include "deploy/experiment/check.h"
 #include "deploy/experiment/grid.h"
 #include "deploy/experiment/run.h"
 #include "deploy/experiment/schedule.h"
@@ -60,7 +61,7 @@ absl::Status WriteDescription(const Experiment& experiment, const Grid& grid) {
 
 absl::StatusOr<int> RunExperiment(const ExperimentFlags& flags) {
   ASSIGN_OR_RETURN(const Experiment experiment, LoadExperiment(flags.grid));
-  ASSIGN_OR_RETURN(Grid grid, MakeGrid(experiment, flags.cells));
+  ASSIGN_OR_RETURN(Grid grid, MakeCheckedGrid(experiment, flags.cells));
   if (flags.dry_run) {
     PrintPlan(grid);
     return 0;

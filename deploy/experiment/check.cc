@@ -6,8 +6,9 @@
 #include <filesystem>
 #include <map>
 #include <set>
+#include <string>
+#include <vector>
 
-#include "absl/status/statusor.h"
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
@@ -15,8 +16,10 @@
 #include "actor/evaluation_loop.h"
 #include "core/run_folder.h"
 #include "core/space.h"
+#include "core/status_macros.h"
 #include "deploy/experiment/cell.h"
 #include "deploy/launch/run_plan.h"
+#include "proto/config/config_check.h"
 #include "proto/config/config_fields.h"
 #include "proto/config/config_file.h"
 
@@ -167,8 +170,7 @@ bool SocketFits(const Cell& cell) {
   return absl::StripPrefix(address, "unix:").size() < sizeof(sockaddr_un::sun_path);
 }
 
-}  // namespace
-
+// What is wrong with the grid itself.
 std::vector<std::string> FindGridErrors(const Experiment& experiment) {
   std::vector<std::string> errors;
   CheckNames("experiment", {experiment.name()}, &errors);
@@ -186,10 +188,12 @@ std::vector<std::string> FindGridErrors(const Experiment& experiment) {
   return errors;
 }
 
-void FindPairErrors(const Experiment& experiment, const std::vector<Cell>& first_cells,
+// What is wrong with pairs of task and contender, by the first seed's cell of each.
+void FindPairErrors(const Experiment& experiment, const std::vector<Cell>& cells,
                     std::vector<std::string>* errors) {
   EnvSpecs specs;
-  for (const Cell& cell : first_cells) {
+  for (const Cell& cell : cells) {
+    if (cell.seed != 1) continue;
     const auto note = [&](absl::string_view what) {
       errors->push_back(absl::StrCat("task '", cell.task, "', contender '", cell.contender, "': ", what));
     };
@@ -210,6 +214,22 @@ void FindPairErrors(const Experiment& experiment, const std::vector<Cell>& first
   }
 }
 
+// Which globs choose none of the cells.
+void FindUnansweredGlobs(const std::vector<std::string>& only, const Experiment& experiment,
+                         const std::vector<Cell>& cells, std::vector<std::string>* errors) {
+  std::vector<std::string> known = NamesOf(experiment.task());
+  const std::vector<std::string> contenders = NamesOf(experiment.contender());
+  known.insert(known.end(), contenders.begin(), contenders.end());
+  for (const std::string& glob : only) {
+    const auto chosen = [&glob](const Cell& cell) { return Chooses(glob, cell); };
+    if (std::any_of(cells.begin(), cells.end(), chosen)) continue;
+    errors->push_back(absl::StrCat("--only: expected a glob of TASK, CONTENDER, TASK/CONTENDER or ",
+                                   "TASK/CONTENDER/seed-N that a cell answers to, found '", glob, "'; ",
+                                   Suggest(glob, known)));
+  }
+}
+
+// What is wrong with the chosen cells.
 void FindCellErrors(const Experiment& experiment, const std::vector<Cell>& cells,
                     std::vector<std::string>* errors) {
   std::set<std::string> missing;
@@ -227,6 +247,27 @@ void FindCellErrors(const Experiment& experiment, const std::vector<Cell>& cells
   errors->push_back(absl::StrCat("--run-dir: expected a path short enough for the unix sockets within (",
                                  sizeof(sockaddr_un::sun_path) - 1, " bytes), found '", longest->folder,
                                  "'; choose a shorter one, or one relative to the working folder"));
+}
+
+}  // namespace
+
+absl::StatusOr<Grid> MakeCheckedGrid(const Experiment& experiment, const GridOptions& options) {
+  std::vector<std::string> errors = FindGridErrors(experiment);
+  const Scale* scale = FindScale(experiment, options.scale);
+  if (scale == nullptr && experiment.scale_size() > 0) {
+    errors.push_back(absl::StrCat("--scale: expected a scale of the grid, found '", options.scale, "'; ",
+                                  Suggest(options.scale, NamesOf(experiment.scale()))));
+    scale = FindScale(experiment, "");  // what is wrong with the cells is told beside it
+  }
+  const std::string source = absl::StrCat("experiment '", experiment.name(), "'");
+  if (scale == nullptr) return AllErrors(errors, source);
+  Grid grid = MakeGrid(experiment, *scale, options);
+  FindPairErrors(experiment, grid.cells, &errors);
+  FindUnansweredGlobs(options.only, experiment, grid.cells, &errors);
+  Choose(options.only, &grid.cells);
+  FindCellErrors(experiment, grid.cells, &errors);
+  RETURN_IF_ERROR(AllErrors(errors, source));
+  return grid;
 }
 
 }  // namespace dbr

@@ -7,10 +7,6 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "core/status_macros.h"
-#include "deploy/experiment/check.h"
-#include "proto/config/config_check.h"
-#include "proto/config/config_fields.h"
 
 namespace dbr {
 namespace {
@@ -38,8 +34,9 @@ bool IsFor(const TaskConfig& on, const Task& task, const Scale& scale) {
   return on.task().empty() || AnyMatches(on.task(), task.name());
 }
 
-// A place for each pair of a task and a contender that takes part in it, with the first seed.
-std::vector<Cell> FirstCells(const Experiment& experiment, const Scale& scale, const GridOptions& options) {
+// A cell with the first seed, and no folder yet, for each pair of a task and a contender that takes part in
+// it.
+std::vector<Cell> FirstCells(const Experiment& experiment, const Scale& scale, const std::string& data) {
   std::vector<Cell> cells;
   for (const Task& task : experiment.task()) {
     for (const Contender& contender : experiment.contender()) {
@@ -48,7 +45,7 @@ std::vector<Cell> FirstCells(const Experiment& experiment, const Scale& scale, c
                        .contender = contender.name(),
                        .kind = task.kind(),
                        .seed = 1,
-                       .config = MergedConfig(experiment, task, contender, scale, options.data),
+                       .config = MergedConfig(experiment, task, contender, scale, data),
                        .folder = {}});
     }
   }
@@ -70,36 +67,6 @@ std::vector<Cell> AllSeeds(const std::vector<Cell>& first_cells, std::uint32_t s
   return cells;
 }
 
-std::vector<std::string> TasksAndContenders(const Experiment& experiment) {
-  std::vector<std::string> names;
-  for (const Task& task : experiment.task()) names.push_back(task.name());
-  for (const Contender& contender : experiment.contender()) names.push_back(contender.name());
-  return names;
-}
-
-// Leaves the chosen ones, and names the globs that choose none.
-void Choose(const std::vector<std::string>& only, const Experiment& experiment, std::vector<Cell>* cells,
-            std::vector<std::string>* errors) {
-  if (only.empty()) return;
-  for (const std::string& glob : only) {
-    const auto chosen = [&glob](const Cell& cell) { return Chooses(glob, cell); };
-    if (std::any_of(cells->begin(), cells->end(), chosen)) continue;
-    errors->push_back(absl::StrCat("--only: expected a glob of TASK, CONTENDER, TASK/CONTENDER or ",
-                                   "TASK/CONTENDER/seed-N that a cell answers to, found '", glob, "'; ",
-                                   Suggest(glob, TasksAndContenders(experiment))));
-  }
-  std::erase_if(*cells, [&only](const Cell& cell) {
-    return std::none_of(only.begin(), only.end(),
-                        [&cell](const std::string& glob) { return Chooses(glob, cell); });
-  });
-}
-
-std::string UnknownScale(const Experiment& experiment, const std::string& name) {
-  std::vector<std::string> known;
-  for (const Scale& scale : experiment.scale()) known.push_back(scale.name());
-  return absl::StrCat("--scale: expected a scale of the grid, found '", name, "'; ", Suggest(name, known));
-}
-
 }  // namespace
 
 std::string Cell::name() const {
@@ -114,25 +81,20 @@ std::string Cell::config_file() const {
   return absl::StrCat(folder, ".textproto");
 }
 
-absl::StatusOr<Grid> MakeGrid(const Experiment& experiment, const GridOptions& options) {
-  std::vector<std::string> errors = FindGridErrors(experiment);
-  const Scale* named = FindScale(experiment, options.scale);
-  if (named == nullptr && experiment.scale_size() > 0)
-    errors.push_back(UnknownScale(experiment, options.scale));
-  // What is wrong with the cells is told beside an unknown scale.
-  const Scale* scale = named != nullptr ? named : FindScale(experiment, "");
-  const std::string source = absl::StrCat("experiment '", experiment.name(), "'");
-  if (scale == nullptr) return AllErrors(errors, source);
-  Grid grid{.name = experiment.name(), .scale = scale->name(), .run_dir = options.run_dir, .cells = {}};
+Grid MakeGrid(const Experiment& experiment, const Scale& scale, const GridOptions& options) {
+  Grid grid{.name = experiment.name(), .scale = scale.name(), .run_dir = options.run_dir, .cells = {}};
   if (grid.run_dir.empty()) grid.run_dir = absl::StrCat("runs/", grid.name, "-", grid.scale);
-  const std::uint32_t seeds = options.seeds > 0 ? options.seeds : scale->seeds();
-  const std::vector<Cell> first_cells = FirstCells(experiment, *scale, options);
-  FindPairErrors(experiment, first_cells, &errors);
-  grid.cells = AllSeeds(first_cells, seeds, grid.run_dir);
-  Choose(options.only, experiment, &grid.cells, &errors);
-  FindCellErrors(experiment, grid.cells, &errors);
-  RETURN_IF_ERROR(AllErrors(errors, source));
+  const std::uint32_t seeds = options.seeds > 0 ? options.seeds : scale.seeds();
+  grid.cells = AllSeeds(FirstCells(experiment, scale, options.data), seeds, grid.run_dir);
   return grid;
+}
+
+void Choose(const std::vector<std::string>& only, std::vector<Cell>* cells) {
+  if (only.empty()) return;
+  std::erase_if(*cells, [&only](const Cell& cell) {
+    return std::none_of(only.begin(), only.end(),
+                        [&cell](const std::string& glob) { return Chooses(glob, cell); });
+  });
 }
 
 Config MergedConfig(const Experiment& experiment, const Task& task, const Contender& contender,

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "proto/experiment.pb.h"
 
@@ -41,13 +40,16 @@ struct Grid {
   std::string name;
   std::string scale;
   std::string run_dir;
-  std::vector<Cell>
-      cells;  // all of the first seed, then all of the second, ...; tasks and contenders in the file's order
+  // All of the first seed, then all of the second, ...; tasks and contenders in the file's order.
+  std::vector<Cell> cells;
 };
 
-// The chosen cells. InvalidArgument lists ALL that is wrong: what deploy/experiment/check.h finds, an unknown
-// scale and globs that no cell answers to.
-absl::StatusOr<Grid> MakeGrid(const Experiment& experiment, const GridOptions& options);
+// The grid at one of its scales with every cell, whatever options.scale and options.only say. Nothing is
+// checked: MakeCheckedGrid (deploy/experiment/check.h) does that.
+Grid MakeGrid(const Experiment& experiment, const Scale& scale, const GridOptions& options);
+
+// Leaves the cells that one of the globs chooses; all of them where there is no glob.
+void Choose(const std::vector<std::string>& only, std::vector<Cell>* cells);
 
 // The config of a cell but for its seed (the order stands in proto/experiment.proto), with the path of its
 // seed buffer within `data`, and absolute.

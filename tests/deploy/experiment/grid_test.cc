@@ -12,6 +12,7 @@
 #include "absl/strings/str_split.h"
 #include "core/file_io.h"
 #include "deploy/experiment/cell.h"
+#include "deploy/experiment/check.h"
 #include "proto/config/config_file.h"
 #include "proto/config/experiment_file.h"
 #include "tests/support/temp_dir.h"
@@ -82,7 +83,7 @@ class GridTest : public testing::Test {
   }
 
   static std::vector<std::string> ErrorsOf(const Experiment& experiment, const GridOptions& options) {
-    const absl::Status status = MakeGrid(experiment, options).status();
+    const absl::Status status = MakeCheckedGrid(experiment, options).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << "accepted";
     std::vector<std::string> lines = absl::StrSplit(std::string(status.message()), "\n  ");
     if (lines.size() > 1) lines.erase(lines.begin());
@@ -94,7 +95,7 @@ class GridTest : public testing::Test {
 
   // Of the first seed's cells of the grid as it stands.
   Config ConfigOf(const std::string& name) const {
-    const auto grid = MakeGrid(Changed({}), Options());
+    const auto grid = MakeCheckedGrid(Changed({}), Options());
     EXPECT_TRUE(grid.ok()) << grid.status();
     for (const Cell& cell : grid->cells) {
       if (cell.name() == name) return cell.config;
@@ -128,11 +129,11 @@ TEST_F(GridTest, WhatDiffersAtOneScaleHoldsThereAlone) {
   const Experiment experiment =
       Changed({{"on { task: \"connect*\"", "on { task: [\"hopper\", \"connect*\"] scale: \"paper\""}});
   GridOptions options = Options();
-  auto grid = MakeGrid(experiment, options);
+  auto grid = MakeCheckedGrid(experiment, options);
   ASSERT_TRUE(grid.ok()) << grid.status();
   EXPECT_EQ(grid->cells[0].config.algorithm().dbr().epsilon(), 0.1);
   options.scale = "paper";
-  grid = MakeGrid(experiment, options);
+  grid = MakeCheckedGrid(experiment, options);
   ASSERT_TRUE(grid.ok()) << grid.status();
   EXPECT_EQ(grid->cells[0].config.algorithm().dbr().epsilon(), 0.2);
   EXPECT_EQ(grid->cells[1].config.algorithm().dbr().epsilon(), 0.2) << "the other of its tasks";
@@ -148,7 +149,7 @@ TEST_F(GridTest, SeedBuffersLieInTheDataFolder) {
 }
 
 TEST_F(GridTest, EveryCellHasOneSeedBeforeAnyHasTwo) {
-  const auto grid = MakeGrid(Changed({}), Options());
+  const auto grid = MakeCheckedGrid(Changed({}), Options());
   ASSERT_TRUE(grid.ok()) << grid.status();
   EXPECT_THAT(NamesOf(*grid), ElementsAre("connect4/dbr/seed-1", "hopper/dbr/seed-1", "hopper/sac/seed-1",
                                           "hopper-medium/dbr/seed-1", "hopper-medium/sac/seed-1",
@@ -164,24 +165,24 @@ TEST_F(GridTest, EveryCellHasOneSeedBeforeAnyHasTwo) {
 TEST_F(GridTest, TheFirstScaleAndItsNumberOfSeedsUnlessToldOtherwise) {
   GridOptions options = Options();
   options.run_dir.clear();
-  auto grid = MakeGrid(Changed({}), options);
+  auto grid = MakeCheckedGrid(Changed({}), options);
   ASSERT_TRUE(grid.ok()) << grid.status();
   EXPECT_EQ(grid->scale, "smoke");
   EXPECT_EQ(grid->run_dir, "runs/tiny-smoke");
   options.scale = "paper";
-  grid = MakeGrid(Changed({}), options);
+  grid = MakeCheckedGrid(Changed({}), options);
   ASSERT_TRUE(grid.ok()) << grid.status();
   EXPECT_EQ(grid->cells.size(), 5 * 5) << "five seeds by default";
   EXPECT_EQ(grid->cells[0].config.launch().max_episodes(), 90);
   options.seeds = 1;
-  EXPECT_EQ(MakeGrid(Changed({}), options)->cells.size(), 5);
+  EXPECT_EQ(MakeCheckedGrid(Changed({}), options)->cells.size(), 5);
 }
 
 TEST_F(GridTest, OnlyChoosesByTaskContenderPairAndCell) {
   const auto chosen = [&](std::vector<std::string> only) {
     GridOptions options = Options();
     options.only = std::move(only);
-    const auto grid = MakeGrid(Changed({}), options);
+    const auto grid = MakeCheckedGrid(Changed({}), options);
     EXPECT_TRUE(grid.ok()) << grid.status();
     return grid.ok() ? NamesOf(*grid) : std::vector<std::string>();
   };
@@ -313,37 +314,37 @@ TEST_F(GridTest, NamesMissingSeedBuffersOnceWithTheCommandThatMakesThem) {
   GridOptions options = Options();
   options.data = folder_ / "elsewhere";
   const std::string path = folder_ / "elsewhere/hopper-medium.hdf5";
-  EXPECT_EQ(MakeGrid(Changed({}), options).status().message(),
+  EXPECT_EQ(MakeCheckedGrid(Changed({}), options).status().message(),
             absl::StrCat("experiment 'tiny': task 'hopper-medium': expected its seed buffer, found no file '",
                          path, "'; make it with:\n    mkdir -p ", folder_ / "elsewhere",
                          " && dbr dataset record --env hopper --quality medium --steps 1000 --out ", path));
   options.only = {"hopper"};
-  EXPECT_TRUE(MakeGrid(Changed({}), options).ok()) << "cells that are not chosen need none";
+  EXPECT_TRUE(MakeCheckedGrid(Changed({}), options).ok()) << "cells that are not chosen need none";
 }
 
 TEST_F(GridTest, ACellThatHasBegunNeedsItsSeedBufferNoMore) {
   GridOptions options = Options();
   options.only = {"hopper-medium/sac/seed-1"};
-  const auto grid = MakeGrid(Changed({}), options);
+  const auto grid = MakeCheckedGrid(Changed({}), options);
   ASSERT_TRUE(grid.ok()) << grid.status();
   std::filesystem::remove(folder_ / "hopper-medium.hdf5");
-  EXPECT_FALSE(MakeGrid(Changed({}), options).ok());
+  EXPECT_FALSE(MakeCheckedGrid(Changed({}), options).ok());
   std::filesystem::create_directories(grid->cells[0].folder);
   Touch(grid->cells[0].folder + "/config.textproto");
-  EXPECT_TRUE(MakeGrid(Changed({}), options).ok());
+  EXPECT_TRUE(MakeCheckedGrid(Changed({}), options).ok());
 }
 
 TEST_F(GridTest, ACellThatWasKilledBeforeItHadAStoreNeedsItsSeedBuffer) {
   GridOptions options = Options();
   options.only = {"hopper-medium/sac/seed-1"};
-  const auto grid = MakeGrid(Changed({}), options);
+  const auto grid = MakeCheckedGrid(Changed({}), options);
   ASSERT_TRUE(grid.ok()) << grid.status();
   std::filesystem::create_directories(grid->cells[0].folder);
   ASSERT_TRUE(
       WriteFileAtomically(grid->cells[0].folder + "/config.textproto", PrintConfig(grid->cells[0].config))
           .ok());
   std::filesystem::remove(folder_ / "hopper-medium.hdf5");
-  EXPECT_THAT(std::string(MakeGrid(Changed({}), options).status().message()),
+  EXPECT_THAT(std::string(MakeCheckedGrid(Changed({}), options).status().message()),
               HasSubstr("task 'hopper-medium': expected its seed buffer"));
 }
 
