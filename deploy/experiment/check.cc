@@ -18,6 +18,7 @@
 #include "core/space.h"
 #include "core/status_macros.h"
 #include "deploy/experiment/cell.h"
+#include "deploy/launch/run_limits.h"
 #include "deploy/launch/run_plan.h"
 #include "proto/config/config_check.h"
 #include "proto/config/config_fields.h"
@@ -120,12 +121,6 @@ class EnvSpecs {
   std::map<std::string, absl::StatusOr<EnvSpec>> specs_;
 };
 
-bool Ends(const Config& config) {
-  const LaunchConfig& limits = config.launch();
-  return config.learner().max_updates() > 0 || limits.max_episodes() > 0 || limits.max_steps() > 0 ||
-         limits.max_seconds() > 0;
-}
-
 // A row of the report that the final evaluation would leave empty; "" where there is none.
 std::string WrongMeasure(const Task& task, const Config& config, const EnvSpec& env) {
   const auto& named = config.evaluation().final_opponents();
@@ -206,7 +201,7 @@ void FindPairErrors(const Experiment& experiment, const std::vector<Cell>& cells
     const std::string offline = cell.kind == Task::OFFLINE ? WrongOffline(cell.config) : "";
     if (!offline.empty()) {
       note(offline);
-    } else if (!Ends(cell.config)) {
+    } else if (!RunLimits(cell.config).any()) {
       note(
           "expected an end, found none: set learner.max_updates, launch.max_steps, launch.max_episodes or "
           "launch.max_seconds");

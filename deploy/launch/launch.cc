@@ -3,16 +3,17 @@
 #include <spdlog/sinks/basic_file_sink.h>
 
 #include <filesystem>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_join.h"
 #include "absl/time/clock.h"
 #include "actor/evaluation_loop.h"
 #include "core/file_io.h"
 #include "core/safetensors.h"
 #include "core/status_macros.h"
 #include "deploy/launch/commit.h"
+#include "deploy/launch/health.h"
 #include "deploy/launch/result_tables.h"
 #include "deploy/launch/results.h"
 #include "deploy/launch/summary_reader.h"
@@ -44,22 +45,30 @@ std::string Reason(const RunSummary& summary) {
 }
 
 const char* EpisodesWord(const EnvSpec& env) {
-  return env.has_score ? " games" : " episodes";
+  return env.has_score ? "games" : "episodes";
 }
 
-// What ends the run, for people.
-std::string Until(const Config& config, const EnvSpec& env) {
-  const LaunchConfig& limits = config.launch();
-  std::vector<std::string> until;
-  if (limits.max_seconds() > 0) until.push_back(Clock(absl::Seconds(limits.max_seconds())));
-  if (limits.max_episodes() > 0)
-    until.push_back(absl::StrCat(WithCommas(limits.max_episodes()), EpisodesWord(env)));
-  if (limits.max_steps() > 0) until.push_back(absl::StrCat(WithCommas(limits.max_steps()), " online steps"));
-  const std::uint64_t updates = config.learner().max_updates();
-  if (updates > 0) until.push_back(absl::StrCat(WithCommas(updates), " updates"));
-  if (limits.stop_at_return() != 0)
-    until.push_back(absl::StrCat("an evaluated return of ", limits.stop_at_return()));
-  return until.empty() ? "it is stopped" : absl::StrJoin(until, " or ");
+std::string CountOfActors(int actors) {
+  return absl::StrCat(actors, actors == 1 ? " actor" : " actors");
+}
+
+// What a launch says of itself before anything has happened, after what earlier ones of the run came to.
+RunSummary BeginSummary(const RunPlan& plan) {
+  RunSummary summary;
+  if (plan.resume) summary = ReadSummary(plan.folder);
+  summary.env = plan.config.env().name();
+  summary.algorithm = AlgorithmName(plan.config);
+  summary.seed = plan.config.seed();
+  summary.config = plan.config_source;
+  summary.commit = BuildCommit();
+  summary.seed_buffer.path = plan.config.replay().seed_buffer().path();
+  summary.offline_updates = plan.config.learner().offline_updates();
+  summary.every_updates = plan.config.evaluation().every_updates();
+  summary.ended = RunEnding::kRunning;
+  summary.failure.clear();
+  summary.final_results.clear();
+  ++summary.launches;
+  return summary;
 }
 
 }  // namespace
@@ -77,45 +86,33 @@ absl::StatusOr<std::unique_ptr<Launch>> Launch::Create(RunPlan plan, std::string
 }
 
 Launch::Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_ptr<spdlog::logger> log)
-    : plan_(std::move(plan)), programs_(std::move(programs)), log_(std::move(log)), line_(out, kLineEvery) {
-  if (plan_.resume) before_ = ReadSummary(plan_.folder);
-  summary_ = before_;
-  summary_.env = plan_.config.env().name();
-  summary_.algorithm = AlgorithmName(plan_.config);
-  summary_.seed = plan_.config.seed();
-  summary_.config = plan_.config_source;
-  summary_.commit = BuildCommit();
-  summary_.seed_buffer.path = plan_.config.replay().seed_buffer().path();
-  summary_.offline_updates = plan_.config.learner().offline_updates();
-  summary_.every_updates = plan_.config.evaluation().every_updates();
-  summary_.ended = RunEnding::kRunning;
-  summary_.failure.clear();
-  summary_.final_results.clear();
-  ++summary_.launches;
-}
+    : plan_(std::move(plan)),
+      programs_(std::move(programs)),
+      log_(std::move(log)),
+      line_(out, kLineEvery),
+      watch_(plan_.config, BeginSummary(plan_)) {}
 
 absl::StatusOr<int> Launch::Run() {
   Announce();
-  started_ = absl::Now();
+  watch_.Start(absl::Now());
   absl::Status status = StartAll();
   if (status.ok()) status = Train();
   line_.End();
   if (status.ok()) Say("stopping, and saving everything");
   const bool saved = StopAll(/*ask=*/status.ok());
   if (!status.ok()) {
-    summary_.ended = RunEnding::kFailed;
-    summary_.failure = std::string(status.message());
-    log_->error("{}", summary_.failure);
+    watch_.Fail(status);
+    log_->error("{}", summary().failure);
     SaveSummary();
     return status;
   }
   SaveSummary();
   Say(absl::StrCat(
-      "training ended (", Reason(summary_), "): ", WithCommas(summary_.games), EpisodesWord(plan_.env), ", ",
-      WithCommas(summary_.transitions), " transitions, ", WithCommas(summary_.updates), " updates in ",
-      Clock(absl::Seconds(summary_.training_s)),
+      "training ended (", Reason(summary()), "): ", WithCommas(summary().games), " ", EpisodesWord(plan_.env),
+      ", ", WithCommas(summary().transitions), " transitions, ", WithCommas(summary().updates),
+      " updates in ", Clock(absl::Seconds(summary().training_s)),
       saved ? "; all is saved" : absl::StrCat("; NOT all could be saved, see ", plan_.folder.log("launch"))));
-  bool interrupted = summary_.ended == RunEnding::kInterrupted;
+  bool interrupted = summary().ended == RunEnding::kInterrupted;
   if (!interrupted) RETURN_IF_ERROR(FinalEvaluation(&interrupted));
   if (interrupted) {
     Say(absl::StrCat("no final table; it comes with: dbr evaluate --policy ", plan_.folder.root,
@@ -126,13 +123,13 @@ absl::StatusOr<int> Launch::Run() {
 }
 
 void Launch::Announce() {
-  const std::string actors =
-      plan_.actors == 0 ? "no actors" : absl::StrCat(plan_.actors, plan_.actors == 1 ? " actor" : " actors");
-  Say(absl::StrCat(plan_.resume ? "continuing " : "training ", summary_.algorithm, " on ", summary_.env,
-                   ", seed ", summary_.seed, ", ", actors, ", until ", Until(plan_.config, plan_.env),
-                   "; Ctrl-C stops and saves"));
+  Say(absl::StrCat(plan_.resume ? "continuing " : "training ", summary().algorithm, " on ", summary().env,
+                   ", seed ", summary().seed, ", ",
+                   plan_.actors == 0 ? "no actors" : CountOfActors(plan_.actors), ", until ",
+                   watch_.limits().Text(EpisodesWord(plan_.env)), "; Ctrl-C stops and saves"));
   Say(absl::StrCat("run folder: ", plan_.folder.root));
-  if (!summary_.seed_buffer.path.empty()) Say(absl::StrCat("seed buffer: ", summary_.seed_buffer.path));
+  const std::string& seed_buffer = summary().seed_buffer.path;
+  if (!seed_buffer.empty()) Say(absl::StrCat("seed buffer: ", seed_buffer));
 }
 
 absl::Status Launch::StartAll() {
@@ -144,7 +141,7 @@ absl::Status Launch::StartAll() {
   ASSIGN_OR_RETURN(supervisor_, Supervisor::Create(std::move(options)));
   supervisor_->set_restarting(false);
   const absl::Duration replay_within =
-      summary_.seed_buffer.path.empty() ? kServingWithin : kServingSeedBufferWithin;
+      summary().seed_buffer.path.empty() ? kServingWithin : kServingSeedBufferWithin;
   for (ProcessSpec& process : Services(plan_, programs_)) {
     const std::string name = process.name;
     RETURN_IF_ERROR(supervisor_->Start(std::move(process)));
@@ -152,11 +149,11 @@ absl::Status Launch::StartAll() {
     if (name == "learner") RETURN_IF_ERROR(WaitUntilServing(name, plan_.learner_address, kServingWithin));
     if (supervisor_->stop_signals() > 0) return absl::OkStatus();
   }
-  if (summary_.offline_updates == 0) RETURN_IF_ERROR(StartActors());
+  if (summary().offline_updates == 0) RETURN_IF_ERROR(StartActors());
   supervisor_->set_restarting(true);
   monitor_ = std::make_unique<RunMonitor>(plan_.replay_address, plan_.learner_address, kAskEvery,
                                           [supervisor = supervisor_.get()] { supervisor->Wake(); });
-  training_since_ = absl::Now();
+  watch_.StartTraining(absl::Now());
   TellOfTheSeedBuffer();
   return absl::OkStatus();
 }
@@ -169,8 +166,8 @@ absl::Status Launch::StartActors() {
 }
 
 void Launch::TellOfTheSeedBuffer() {
-  summary_.Update(monitor_->Ask(kFirstAnswerWithin));
-  const SeedBufferSummary& seed_buffer = summary_.seed_buffer;
+  watch_.Count(monitor_->Ask(kFirstAnswerWithin));
+  const SeedBufferSummary& seed_buffer = summary().seed_buffer;
   if (seed_buffer.rows == 0) return;
   Say(absl::StrCat("the seed buffer holds ", WithCommas(seed_buffer.rows), " transitions, ",
                    WithCommas(seed_buffer.episodes), " whole episodes with a mean return of ",
@@ -180,7 +177,6 @@ void Launch::TellOfTheSeedBuffer() {
     Say(absl::StrCat(WithCommas(seed_buffer.bad_rows), " rows with values that are not finite are left out"));
 }
 
-// OK also where a stop signal came first.
 absl::Status Launch::WaitUntilServing(const std::string& name, const std::string& address,
                                       absl::Duration within) {
   const HealthCheck check(address, within, [supervisor = supervisor_.get()] { supervisor->Wake(); });
@@ -196,16 +192,47 @@ absl::Status Launch::WaitUntilServing(const std::string& name, const std::string
   return absl::OkStatus();
 }
 
-// Actors first; then what the services count is final and, where `ask` is set, noted; then the services. True
-// where every process ended by itself and without an error.
+absl::Status Launch::Train() {
+  while (supervisor_->stop_signals() == 0) {
+    const absl::Time now = absl::Now();
+    const RunSample sample = monitor_->Latest();
+    Observe(sample, now);
+    if (summary().ended != RunEnding::kRunning) return absl::OkStatus();
+    if (!acting_ && watch_.limits().OfflinePhaseIsOver(sample)) {
+      Say(absl::StrCat("offline phase over after ", WithCommas(summary().updates), " updates: starting ",
+                       CountOfActors(plan_.actors)));
+      RETURN_IF_ERROR(StartActors());
+    }
+    // The monitor wakes us, too.
+    RETURN_IF_ERROR(supervisor_->Wait(watch_.limits().Deadline(summary(), now)));
+  }
+  watch_.Interrupt();
+  return absl::OkStatus();
+}
+
+void Launch::Observe(const RunSample& sample, absl::Time now) {
+  watch_.Observe(sample, supervisor_->restarts(), now);
+  if (sample.replay.has_value()) {
+    line_.Update({.sample = sample,
+                  .left = watch_.TimeLeft(sample),
+                  .scored = plan_.env.has_score,
+                  .offline_updates = acting_ ? 0 : summary().offline_updates},
+                 now);
+  }
+  if (!watch_.IsDueToBeSaved(now)) return;
+  watch_.CountWallTime(now);
+  SaveSummary();
+}
+
+// Actors first; then what the services count is final and, where `ask` is set, noted; then the services.
 bool Launch::StopAll(bool ask) {
   if (supervisor_ == nullptr) return false;
   bool clean = supervisor_->Stop(kStopActors);
-  if (ask && monitor_ != nullptr) summary_.Update(monitor_->Ask(kLastAnswerWithin));
+  if (ask && monitor_ != nullptr) watch_.Count(monitor_->Ask(kLastAnswerWithin));
   monitor_.reset();
   clean = supervisor_->Stop() && clean;
   supervisor_.reset();
-  summary_.wall_s = before_.wall_s + absl::ToDoubleSeconds(absl::Now() - started_);
+  watch_.CountWallTime(absl::Now());
   return clean;
 }
 
@@ -219,7 +246,7 @@ absl::Status Launch::FinalEvaluation(bool* interrupted) {
   ASSIGN_OR_RETURN(const auto policy, PolicyNetworks::Create(std::move(snapshot)));
   const EvaluationConfig& config = plan_.config.evaluation();
   const std::vector<std::string> opponents =
-      OpponentsToEvaluate(summary_.env, {config.final_opponents().begin(), config.final_opponents().end()});
+      OpponentsToEvaluate(summary().env, {config.final_opponents().begin(), config.final_opponents().end()});
   Say(absl::StrCat("\nfinal evaluation of policy ", version, " (", plan_.folder.latest_policy(), "):"));
   const Interrupt interrupt;
   for (const std::string& opponent : opponents) {
@@ -233,11 +260,11 @@ absl::Status Launch::FinalEvaluation(bool* interrupted) {
       return absl::OkStatus();
     }
     RETURN_IF_ERROR(result.status());
-    summary_.final_results.push_back(*std::move(result));
+    watch_.AddFinalResult(*std::move(result));
   }
   SaveSummary();
-  std::string table = ResultTable(summary_.final_results);
-  if (const std::string returns = ReturnsTable(summary_); !returns.empty())
+  std::string table = ResultTable(summary().final_results);
+  if (const std::string returns = ReturnsTable(summary()); !returns.empty())
     absl::StrAppend(&table, "\n", returns);
   Say(table);
   return WriteFileAtomically(ResultsPath(plan_.folder), table);
@@ -249,9 +276,7 @@ void Launch::Say(const std::string& text) {
 }
 
 void Launch::SaveSummary() {
-  if (supervisor_ != nullptr)
-    summary_.wall_s = before_.wall_s + absl::ToDoubleSeconds(absl::Now() - started_);
-  const absl::Status written = WriteSummary(summary_, plan_.folder);
+  const absl::Status written = WriteSummary(summary(), plan_.folder);
   if (!written.ok()) log_->warn("{}", std::string(written.message()));
 }
 

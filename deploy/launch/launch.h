@@ -5,19 +5,17 @@
 
 #include <cstdio>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
-#include "deploy/launch/evaluation_curve.h"
-#include "deploy/launch/health.h"
 #include "deploy/launch/monitor.h"
 #include "deploy/launch/progress.h"
 #include "deploy/launch/run_plan.h"
 #include "deploy/launch/run_summary.h"
+#include "deploy/launch/run_watch.h"
 #include "deploy/process/supervisor.h"
 
 namespace dbr {
@@ -35,20 +33,18 @@ class Launch {
 
  private:
   Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_ptr<spdlog::logger> log);
+  const RunSummary& summary() const { return watch_.summary(); }
+
   void Announce();
+  // Services, and actors where there is no offline phase. OK also where a stop signal came first.
   absl::Status StartAll();
   absl::Status StartActors();
-  void TellOfTheSeedBuffer();
   absl::Status WaitUntilServing(const std::string& name, const std::string& address, absl::Duration within);
-  // Watching (launch_watch.cc).
+  void TellOfTheSeedBuffer();
+  // Blocks until a limit or a stop signal.
   absl::Status Train();
-  void Observe(absl::Time now);
-  // Which of the config's limits the run has come to; empty: none.
-  std::optional<RunEnding> LimitReached(const RunSample& sample,
-                                        const std::vector<EvaluationPoint>& evaluations) const;
-  bool OfflinePhaseIsOver(const RunSample& sample) const;
-  std::optional<absl::Duration> TimeLeft(const RunSample& sample) const;
-
+  void Observe(const RunSample& sample, absl::Time now);
+  // True where every process ended by itself and without an error. `ask`: for what the services count last.
   bool StopAll(bool ask);
   absl::Status FinalEvaluation(bool* interrupted);
   void Say(const std::string& text);
@@ -58,12 +54,7 @@ class Launch {
   const std::string programs_;
   const std::shared_ptr<spdlog::logger> log_;
   ProgressLine line_;
-  RunSummary before_;  // of the launches that this one continues
-  RunSummary summary_;
-  absl::Time started_ = absl::InfiniteFuture();
-  absl::Time training_since_ = absl::InfiniteFuture();
-  absl::Time summary_saved_ = absl::InfinitePast();
-  RunSample first_;      // for rates of this launch
+  RunWatch watch_;
   bool acting_ = false;  // the actors were started
   std::unique_ptr<Supervisor> supervisor_;
   std::unique_ptr<RunMonitor> monitor_;
