@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "actor/evaluation_loop.h"
 #include "actor/evaluator.h"
 #include "actor/policy_fit.h"
@@ -37,6 +38,15 @@ struct EvaluateFlags {
   bool json = false;
   std::string film;
 };
+
+// The opponents of the environments that have any, for people.
+std::string KnownOpponents() {
+  std::vector<std::string> known;
+  for (const std::string& env : EnvNames()) {
+    if (!PresentationOf(env).opponents.empty()) known.push_back(PresentationOf(env).opponents);
+  }
+  return absl::StrJoin(known, "; ");
+}
 
 // Films the first episode of the evaluation with that seed.
 absl::StatusOr<int> RunFilm(const EvaluateFlags& flags, const PolicyNetworks& policy, ActingMode mode) {
@@ -102,8 +112,9 @@ void AddEvaluate(CLI::App* app, int* exit_code) {
       ->required()
       ->type_name("FILE_OR_RUN");
   command
-      ->add_option("--opponent", flags->opponent,
-                   "random, one_ply or mcts:N [all that the environment has; with --json the first of them]")
+      ->add_option(
+          "--opponent", flags->opponent,
+          absl::StrCat(KnownOpponents(), " [all that the environment has; with --json the first of them]"))
       ->type_name("NAME");
   command
       ->add_option("--episodes", flags->episodes, "Games against each opponent, every second one begun by it")

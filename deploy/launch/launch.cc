@@ -19,6 +19,7 @@
 #include "deploy/launch/summary_reader.h"
 #include "deploy/process/interrupt.h"
 #include "deploy/terminal/terminal.h"
+#include "envs/registry/registry.h"
 #include "nn/policy.h"
 
 namespace dbr {
@@ -42,10 +43,6 @@ SupervisorOptions OptionsOf(const LaunchConfig& config) {
 std::string Reason(const RunSummary& summary) {
   if (summary.ended == RunEnding::kInterrupted) return "stopped by a signal";
   return absl::StrCat("reached ", TextOf(summary.ended));
-}
-
-const char* EpisodesWord(const EnvSpec& env) {
-  return env.has_score ? "games" : "episodes";
 }
 
 std::string CountOfActors(int actors) {
@@ -92,6 +89,10 @@ Launch::Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_p
       line_(out, kLineEvery),
       watch_(plan_.config, BeginSummary(plan_)) {}
 
+const EnvPresentation& Launch::presentation() const {
+  return PresentationOf(plan_.env.name);
+}
+
 absl::StatusOr<int> Launch::Run() {
   Announce();
   watch_.Start(absl::Now());
@@ -108,7 +109,7 @@ absl::StatusOr<int> Launch::Run() {
   }
   SaveSummary();
   Say(absl::StrCat(
-      "training ended (", Reason(summary()), "): ", WithCommas(summary().games), " ", EpisodesWord(plan_.env),
+      "training ended (", Reason(summary()), "): ", WithCommas(summary().games), " ", presentation().episodes,
       ", ", WithCommas(summary().transitions), " transitions, ", WithCommas(summary().updates),
       " updates in ", Clock(absl::Seconds(summary().training_s)),
       saved ? "; all is saved" : absl::StrCat("; NOT all could be saved, see ", plan_.folder.log("launch"))));
@@ -126,7 +127,7 @@ void Launch::Announce() {
   Say(absl::StrCat(plan_.resume ? "continuing " : "training ", summary().algorithm, " on ", summary().env,
                    ", seed ", summary().seed, ", ",
                    plan_.actors == 0 ? "no actors" : CountOfActors(plan_.actors), ", until ",
-                   watch_.limits().Text(EpisodesWord(plan_.env)), "; Ctrl-C stops and saves"));
+                   watch_.limits().Text(presentation().episodes), "; Ctrl-C stops and saves"));
   Say(absl::StrCat("run folder: ", plan_.folder.root));
   const std::string& seed_buffer = summary().seed_buffer.path;
   if (!seed_buffer.empty()) Say(absl::StrCat("seed buffer: ", seed_buffer));
@@ -215,7 +216,7 @@ void Launch::Observe(const RunSample& sample, absl::Time now) {
   if (sample.replay.has_value()) {
     line_.Update({.sample = sample,
                   .left = watch_.TimeLeft(sample),
-                  .scored = plan_.env.has_score,
+                  .presentation = presentation(),
                   .offline_updates = acting_ ? 0 : summary().offline_updates},
                  now);
   }

@@ -17,6 +17,7 @@
 #include "deploy/launch/run_summary.h"
 #include "deploy/launch/run_watch.h"
 #include "deploy/process/supervisor.h"
+#include "envs/presentation.h"
 
 namespace dbr {
 
@@ -34,6 +35,7 @@ class Launch {
  private:
   Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_ptr<spdlog::logger> log);
   const RunSummary& summary() const { return watch_.summary(); }
+  const EnvPresentation& presentation() const;
 
   void Announce();
   // Services, and actors where there is no offline phase. OK also where a stop signal came first.

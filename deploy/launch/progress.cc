@@ -4,7 +4,6 @@
 #include <utility>
 #include <vector>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/strip.h"
@@ -14,9 +13,6 @@ namespace dbr {
 namespace {
 
 constexpr int kWidthWithoutTerminal = 200;
-
-// The opponents whose scores are watched while a run goes on.
-constexpr const char* kWatched[] = {"random", "mcts:10"};
 
 const EvaluationReport* FindReport(const LearnerStatus& learner, absl::string_view opponent) {
   for (const EvaluationReport& report : learner.evaluations()) {
@@ -33,13 +29,14 @@ std::string Score(const RunSample& sample, absl::string_view opponent, bool word
   return words ? score : std::string(absl::StripPrefix(score, "0"));
 }
 
-std::string Scores(const RunSample& sample, bool words) {
+std::string Scores(const Progress& progress, bool words) {
+  const RunSample& sample = progress.sample;
   std::vector<std::string> parts;
   const bool any = sample.learner.has_value() && sample.learner->evaluations_size() > 0;
-  for (const char* opponent : kWatched) {
-    if (any && !FindReport(*sample.learner, opponent)) continue;  // the config leaves it out
-    const std::string name = words ? opponent : absl::StartsWith(opponent, "mcts") ? "mcts" : "rnd";
-    parts.push_back(absl::StrCat(name, " ", Score(sample, opponent, words)));
+  for (const WatchedOpponent& opponent : progress.presentation.watched) {
+    if (any && !FindReport(*sample.learner, opponent.name)) continue;  // the config leaves it out
+    parts.push_back(
+        absl::StrCat(words ? opponent.name : opponent.short_name, " ", Score(sample, opponent.name, words)));
   }
   return absl::StrJoin(parts, " ");
 }
@@ -73,15 +70,15 @@ std::vector<std::string> Doing(const Progress& progress, const StatsReply& repla
                                  Compact(static_cast<double>(progress.offline_updates))),
             rate};
   }
-  const char* episodes = progress.scored ? " games" : words ? " episodes" : " ep";
+  const EnvPresentation& env = progress.presentation;
   return {
       absl::StrCat(words ? WithCommas(replay.episodes()) : Compact(static_cast<double>(replay.episodes())),
-                   episodes),
+                   " ", words ? env.episodes : env.short_episodes),
       absl::StrCat(Compact(replay.insert_rate()), words ? " transitions/s" : " t/s"), rate};
 }
 
 std::vector<std::string> Success(const Progress& progress, const StatsReply& replay, bool words) {
-  if (progress.scored) return {Scores(progress.sample, words)};
+  if (!progress.presentation.watched.empty()) return {Scores(progress, words)};
   std::vector<std::string> parts;
   if (progress.offline_updates == 0)
     parts.push_back(absl::StrCat(words ? "train return " : "train ", TrainReturn(replay)));

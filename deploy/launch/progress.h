@@ -8,6 +8,7 @@
 
 #include "absl/time/time.h"
 #include "deploy/launch/monitor.h"
+#include "envs/presentation.h"
 
 namespace dbr {
 
@@ -15,15 +16,15 @@ namespace dbr {
 struct Progress {
   RunSample sample;
   std::optional<absl::Duration> left;  // empty: no limit, or not known yet
-  bool scored = true;                  // the environment's episodes are games with a score
+  EnvPresentation presentation;        // of the environment
   std::uint64_t offline_updates = 0;   // while the phase lasts: how many it has
 };
 
-// One line of at most `width` cells: games, transitions/s, updates/s, sizes of D, D+ and D-, policy version
-// and lag (how many versions the slowest subscriber is behind), the newest scores against random and mcts:10,
-// time left. Without scores it counts episodes and shows the mean return of the actors' last ones and of the
-// newest evaluation; in the offline phase how far it is, in place of what actors do. Words where there is
-// room, abbreviations where there is not.
+// One line of at most `width` cells: episodes, transitions/s, updates/s, sizes of D, D+ and D-, policy
+// version and lag (how many versions the slowest subscriber is behind), the newest scores against the watched
+// opponents, time left. Without opponents to watch it shows the mean return of the actors' last episodes and
+// of the newest evaluation; in the offline phase how far it is, in place of what actors do. Words where there
+// is room, abbreviations where there is not.
 std::string ProgressText(const Progress& progress, int width);
 
 // Writes it: in place on a terminal, else as a line now and then. One thread.

@@ -2,53 +2,62 @@
 
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "deploy/terminal/terminal.h"
+#include "envs/registry/registry.h"
 
 namespace dbr {
 namespace {
 
-// Siu, Traish and Xu 2021, table of results, the two Connect-4 rows: mean score and standard deviation.
-struct PaperRow {
-  const char* opponent;
-  const char* dbr;
-  const char* bear;
-  const char* ddqn;
-};
-constexpr PaperRow kPaper[] = {{"random", "0.982 ± 0.016", "0.967 ± 0.116", "0.589 ± 0.161"},
-                               {"mcts:10", "0.912 ± 0.079", "0.750 ± 0.187", "0.214 ± 0.161"}};
+constexpr int kPublishedWidth = 17;
 
-std::string PaperCells(absl::string_view opponent) {
-  for (const PaperRow& row : kPaper) {
-    if (opponent == row.opponent) {
-      return absl::StrCat(PadLeft(row.dbr, 17), PadLeft(row.bear, 17), PadLeft(row.ddqn, 17));
-    }
+std::string PublishedHeader(const std::vector<PublishedColumn>& columns) {
+  std::string header = " │";
+  const char* whose = "paper: ";
+  for (const PublishedColumn& column : columns) {
+    absl::StrAppend(&header, PadLeft(absl::StrCat(whose, column.label), kPublishedWidth));
+    whose = "";
   }
-  return absl::StrCat(PadLeft("–", 17), PadLeft("–", 17), PadLeft("–", 17));
+  return header;
 }
 
-// Games against opponents: scores, for Connect-4 with the paper's figures beside.
-std::string ScoreTable(absl::Span<const EvaluationResult> results) {
-  const bool connect4 = results[0].env == "connect4";
-  std::string table =
-      absl::StrCat(PadRight(" opponent", 12), PadLeft("games", 8), PadLeft("score ± s.e.", 18));
-  if (connect4) {
-    absl::StrAppend(&table, " │", PadLeft("paper: DBR", 17), PadLeft("BEAR", 17), PadLeft("Double DQN", 17));
+std::string PublishedCells(const std::vector<PublishedColumn>& columns, absl::string_view opponent) {
+  std::string cells = " │";
+  for (const PublishedColumn& column : columns) {
+    std::string cell = "–";
+    for (const PublishedScore& score : column.scores) {
+      if (score.opponent == opponent) cell = absl::StrCat(Fixed(score.mean, 3), " ± ", Fixed(score.std, 3));
+    }
+    absl::StrAppend(&cells, PadLeft(cell, kPublishedWidth));
   }
-  absl::StrAppend(&table, "\n");
+  return cells;
+}
+
+// What stands below a table of scores.
+std::string ScoreNote(const EnvPresentation& presentation) {
+  std::vector<std::string> sentences;
+  if (!presentation.scoring.empty()) sentences.push_back(presentation.scoring);
+  if (!presentation.published.empty()) sentences.push_back("The paper's ± is the standard deviation.");
+  return sentences.empty() ? "" : absl::StrCat(" ", absl::StrJoin(sentences, " "), "\n");
+}
+
+// Episodes against opponents: scores, with published ones beside them.
+std::string ScoreTable(absl::Span<const EvaluationResult> results) {
+  const EnvPresentation& presentation = PresentationOf(results[0].env);
+  const std::vector<PublishedColumn>& published = presentation.published;
+  std::string table =
+      absl::StrCat(PadRight(" opponent", 12), PadLeft(presentation.episodes, 8), PadLeft("score ± s.e.", 18),
+                   published.empty() ? "" : PublishedHeader(published), "\n");
   for (const EvaluationResult& result : results) {
     const std::string cell = absl::StrCat(Fixed(result.score_mean, 3), " ± ", Fixed(result.score_stderr, 3));
     absl::StrAppend(&table, PadRight(absl::StrCat(" ", result.opponent), 12),
-                    PadLeft(WithCommas(result.episodes), 8), PadLeft(cell, 18));
-    if (connect4) absl::StrAppend(&table, " │", PaperCells(result.opponent));
-    absl::StrAppend(&table, "\n");
+                    PadLeft(WithCommas(result.episodes), 8), PadLeft(cell, 18),
+                    published.empty() ? "" : PublishedCells(published, result.opponent), "\n");
   }
-  if (connect4) {
-    absl::StrAppend(&table, " A win counts 1, a draw 0.5; each side starts half of the games. ",
-                    "The paper's ± is the standard deviation.\n");
-  }
-  return table;
+  return absl::StrCat(table, ScoreNote(presentation));
 }
 
 // Environments without a score: the returns of single episodes.

@@ -53,8 +53,8 @@ absl::StatusOr<std::unique_ptr<Opponent>> MakeOpponent(absl::string_view name) {
       simulations <= TreeSearch::kMaxSimulations) {
     return std::make_unique<MctsOpponent>(simulations);
   }
-  return absl::InvalidArgumentError(absl::StrCat("connect4: unknown opponent \"", name,
-                                                 "\"; expected random, one_ply or mcts:N with N from 1 to ",
+  return absl::InvalidArgumentError(absl::StrCat("connect4: unknown opponent \"", name, "\"; expected ",
+                                                 kOpponentNames, " with N from 1 to ",
                                                  TreeSearch::kMaxSimulations, " simulations a move"));
 }
 

@@ -10,6 +10,9 @@
 
 namespace dbr::connect4 {
 
+// The names that MakeOpponent knows, for messages and help texts.
+inline constexpr char kOpponentNames[] = "random, one_ply or mcts:N";
+
 // A player. One thread at a time; it keeps nothing of a game from one move to the next that could change its
 // play, so that one object serves many games.
 class Opponent {

@@ -12,6 +12,7 @@
 #include "envs/bullet/locomotion.h"
 #include "envs/bullet/walker2d.h"
 #include "envs/connect4/env.h"
+#include "envs/connect4/presentation.h"
 
 namespace dbr {
 namespace {
@@ -23,6 +24,7 @@ struct Entry {
   std::vector<std::string> aliases;
   std::vector<std::string> evaluation_opponents;  // empty: a game of one, which takes no opponents
   Made (*make)(absl::string_view name, const std::vector<std::string>& opponents);
+  EnvPresentation presentation = {};
 };
 
 // An environment of the robot that `plan` makes; robots take no opponents.
@@ -38,7 +40,11 @@ Made MakeConnect4(absl::string_view, const std::vector<std::string>& opponents) 
 const std::vector<Entry>& Entries() {
   static const auto* const entries = new std::vector<Entry>{
       {"ant", {"AntBulletEnv-v0"}, {}, MakeRobot<bullet::AntPlan>},
-      {"connect4", {"connect_four"}, {"random", "one_ply", "mcts:10", "mcts:100"}, MakeConnect4},
+      {"connect4",
+       {"connect_four"},
+       {"random", "one_ply", "mcts:10", "mcts:100"},
+       MakeConnect4,
+       connect4::Presentation()},
       {"half_cheetah", {"HalfCheetahBulletEnv-v0"}, {}, MakeRobot<bullet::HalfCheetahPlan>},
       {"hopper", {"HopperBulletEnv-v0"}, {}, MakeRobot<bullet::HopperPlan>},
       {"walker2d", {"Walker2DBulletEnv-v0"}, {}, MakeRobot<bullet::Walker2dPlan>},
@@ -74,6 +80,12 @@ std::vector<std::string> EnvNames() {
   for (const Entry& entry : Entries()) names.push_back(entry.name);
   std::sort(names.begin(), names.end());
   return names;
+}
+
+const EnvPresentation& PresentationOf(absl::string_view env_name) {
+  static const auto* const unknown = new EnvPresentation();
+  const Entry* const entry = Find(env_name);
+  return entry == nullptr ? *unknown : entry->presentation;
 }
 
 std::vector<std::string> EvaluationOpponents(absl::string_view env_name) {

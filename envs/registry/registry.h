@@ -8,6 +8,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "envs/env.h"
+#include "envs/presentation.h"
 
 namespace dbr {
 
@@ -24,6 +25,9 @@ absl::StatusOr<std::unique_ptr<Env>> MakeEnv(const EnvOptions& options);
 
 // All names, sorted; the conformance suite walks them.
 std::vector<std::string> EnvNames();
+
+// What people are told of an environment, by its name or alias; the default one for an unknown name.
+const EnvPresentation& PresentationOf(absl::string_view env_name);
 
 // Opponents against which an environment is evaluated by default, for example random, one_ply, mcts:10,
 // mcts:100; empty where it has none.

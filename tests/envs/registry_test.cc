@@ -47,6 +47,22 @@ TEST(EnvRegistry, AnUnknownOpponentIsAnsweredWithTheKnownOnes) {
               AllOf(HasSubstr("\"mcts\""), HasSubstr("random, one_ply or mcts:N")));
 }
 
+TEST(EnvRegistry, PeopleAreToldOfAnEnvironmentByItsNameOrAlias) {
+  EXPECT_EQ(PresentationOf("connect_four").episodes, "games");
+  EXPECT_EQ(PresentationOf("hopper").episodes, "episodes");
+  EXPECT_THAT(PresentationOf("hopper").watched, IsEmpty());
+  EXPECT_THAT(PresentationOf("conect4").published, IsEmpty());
+}
+
+TEST(EnvRegistry, WatchedOpponentsAreAmongThoseOfTheEvaluation) {
+  for (const std::string& name : EnvNames()) {
+    for (const WatchedOpponent& opponent : PresentationOf(name).watched) {
+      EXPECT_THAT(EvaluationOpponents(name), testing::Contains(opponent.name));
+      EXPECT_LT(opponent.short_name.size(), opponent.name.size());
+    }
+  }
+}
+
 TEST(EnvRegistry, EvaluationOpponentsCanBeMetAndUnknownNamesHaveNone) {
   EXPECT_THAT(EvaluationOpponents("connect4"), ElementsAre("random", "one_ply", "mcts:10", "mcts:100"));
   EXPECT_THAT(EvaluationOpponents("conect4"), IsEmpty());

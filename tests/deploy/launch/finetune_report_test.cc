@@ -96,7 +96,7 @@ TEST(EvaluationCurveTest, FindsTheEndOfTheOfflinePhaseAndTheLowestPointAfter) {
 }
 
 TEST(RobotProgressTest, ShowsReturnsInPlaceOfScores) {
-  Progress progress{.sample = Evaluated(Sample(1500, 3000), 9, 1400, 812.34), .left = {}, .scored = false};
+  Progress progress{.sample = Evaluated(Sample(1500, 3000), 9, 1400, 812.34), .left = {}, .presentation = {}};
   progress.sample.replay->set_episodes(17);
   progress.sample.replay->set_recent_return_mean(512.5);
   const std::string line = ProgressText(progress, 200);
@@ -107,7 +107,8 @@ TEST(RobotProgressTest, ShowsReturnsInPlaceOfScores) {
 }
 
 TEST(RobotProgressTest, ShowsHowFarTheOfflinePhaseIs) {
-  const Progress progress{.sample = Sample(12000, 0), .left = {}, .scored = false, .offline_updates = 50000};
+  const Progress progress{
+      .sample = Sample(12000, 0), .left = {}, .presentation = {}, .offline_updates = 50000};
   EXPECT_THAT(ProgressText(progress, 200),
               AllOf(HasSubstr("offline: 12,000 of 50,000 updates"), HasSubstr("eval return –"),
                     Not(HasSubstr("transitions/s")), Not(HasSubstr("train"))));

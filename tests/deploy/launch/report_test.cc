@@ -5,10 +5,12 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "core/file_io.h"
 #include "deploy/cli/stats_report.h"
@@ -17,6 +19,8 @@
 #include "deploy/launch/results.h"
 #include "deploy/launch/summary_reader.h"
 #include "deploy/terminal/terminal.h"
+#include "envs/registry/registry.h"
+#include "proto/config/experiment_file.h"
 #include "tests/support/temp_dir.h"
 
 namespace dbr {
@@ -26,6 +30,7 @@ using ::testing::AllOf;
 using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::UnorderedElementsAreArray;
 using Json = nlohmann::ordered_json;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -111,8 +116,14 @@ LearnerStatus SomeStatus() {
   return status;
 }
 
-TEST(ProgressTest, SaysEverythingInOneLine) {
+Progress OfConnect4() {
   Progress progress;
+  progress.presentation = PresentationOf("connect4");
+  return progress;
+}
+
+TEST(ProgressTest, SaysEverythingInOneLine) {
+  Progress progress = OfConnect4();
   progress.sample.replay = SomeStats();
   progress.sample.learner = SomeStatus();
   progress.left = absl::Seconds(125);
@@ -124,7 +135,7 @@ TEST(ProgressTest, SaysEverythingInOneLine) {
 }
 
 TEST(ProgressTest, FitsATerminalOfEightyColumns) {
-  Progress progress;
+  Progress progress = OfConnect4();
   progress.sample.replay = SomeStats();
   progress.sample.learner = SomeStatus();
   progress.left = absl::Seconds(125);
@@ -136,14 +147,14 @@ TEST(ProgressTest, FitsATerminalOfEightyColumns) {
 }
 
 TEST(ProgressTest, ShowsTheWatchedOpponentsThatAreEvaluated) {
-  Progress progress;
+  Progress progress = OfConnect4();
   EXPECT_THAT(ProgressText(progress, 200), AllOf(HasSubstr("random –"), HasSubstr("mcts:10 –")));
   progress.sample.learner = SomeStatus();
   EXPECT_THAT(ProgressText(progress, 200), AllOf(HasSubstr("random 0.93"), Not(HasSubstr("mcts:10"))));
 }
 
 TEST(ProgressTest, SaysThatAServiceIsAway) {
-  Progress progress;
+  Progress progress = OfConnect4();
   progress.sample.replay = SomeStats();
   progress.sample.replay_away = true;
   EXPECT_THAT(ProgressText(progress, 200), AllOf(HasSubstr("replay away"), HasSubstr("lag –")));
@@ -183,8 +194,44 @@ TEST(ResultsTest, TableHasThePaperBesideTheScores) {
   EXPECT_THAT(lines[1], AllOf(HasSubstr("random"), HasSubstr("1,000"), HasSubstr("0.971 ± 0.005"),
                               HasSubstr("0.982 ± 0.016"), HasSubstr("0.967"), HasSubstr("0.589")));
   EXPECT_THAT(lines[2], AllOf(HasSubstr("one_ply"), HasSubstr("0.500"), Not(HasSubstr("0.982"))));
+  EXPECT_EQ(lines[0],
+            " opponent      games      score ± s.e. │       paper: DBR             BEAR       Double DQN");
+  EXPECT_EQ(lines[3],
+            " A win counts 1, a draw 0.5; each side starts half of the games. The paper's ± is the standard "
+            "deviation.");
   EXPECT_EQ(DisplayWidth(lines[0]), DisplayWidth(lines[1]));
   EXPECT_EQ(DisplayWidth(lines[1]), DisplayWidth(lines[2]));
+}
+
+// As text, since they were printed so: a line for each opponent and algorithm.
+std::vector<std::string> PublishedScores(const EnvPresentation& presentation) {
+  std::vector<std::string> scores;
+  for (const PublishedColumn& column : presentation.published) {
+    for (const PublishedScore& score : column.scores)
+      scores.push_back(absl::StrCat(score.opponent, " ", column.algorithm, " (", column.label, ") ",
+                                    score.mean, " ± ", score.std));
+  }
+  return scores;
+}
+
+TEST(ResultsTest, ThePublishedScoresAreThoseOfThePapersGrid) {
+  const auto grid = LoadExperiment(DBR_SOURCE_DIR "/deploy/experiments/paper.textproto");
+  ASSERT_TRUE(grid.ok()) << grid.status();
+  std::map<std::string, std::string> labels;
+  for (const Contender& contender : grid->contender()) labels[contender.name()] = contender.label();
+  for (const std::string& env : EnvNames()) {
+    std::vector<std::string> scores;
+    for (const Task& task : grid->task()) {
+      if (task.kind() != Task::GAMES || task.config().env().name() != env) continue;
+      for (const Measure& measure : task.measure()) {
+        for (const Published& one : measure.published())
+          scores.push_back(absl::StrCat(measure.opponent(), " ", one.contender(), " (",
+                                        labels[one.contender()], ") ", one.mean(), " ± ", one.std()));
+      }
+    }
+    EXPECT_THAT(PublishedScores(PresentationOf(env)), UnorderedElementsAreArray(scores)) << env;
+    EXPECT_EQ(scores.size(), env == "connect4" ? 6 : 0);
+  }
 }
 
 TEST(ResultsTest, JsonHasItsStableNames) {
