@@ -32,7 +32,7 @@ absl::Status ProbeMoves(const ProbeFlags& flags, const PolicyNetworks& policy, A
   if (!board.ok()) return absl::InvalidArgumentError(absl::StrCat("--", board.status().message()));
   ASSIGN_OR_RETURN(const std::vector<ProbedPosition> probed, Probe(policy, {*board}, mode, flags.seed));
   const std::string text =
-      flags.json ? ToJson(*flags.moves, probed[0]).dump() + "\n" : Figure(*flags.moves, probed[0]);
+      flags.json ? ToJson(*flags.moves, probed[0]).dump() + "\n" : PositionText(*flags.moves, probed[0]);
   std::fputs(text.c_str(), stdout);
   return absl::OkStatus();
 }
@@ -55,7 +55,7 @@ absl::Status ProbeFile(const ProbeFlags& flags, const PolicyNetworks& policy, Ac
     return absl::OkStatus();
   }
   for (std::size_t i = 0; i < positions.size(); ++i)
-    std::printf("%s\n", FigureLine(positions[i], probed[i]).c_str());
+    std::printf("%s\n", PositionLine(positions[i], probed[i]).c_str());
   std::printf("columns from 1 to 7; ✓ a best move, ~ keeps the value, ✗ gives it away; × a full column\n\n%s",
               SharesText(shares).c_str());
   return absl::OkStatus();

@@ -97,7 +97,7 @@ std::string ShareLine(const char* name, const std::optional<double>& share) {
 
 }  // namespace
 
-std::string Figure(absl::string_view moves, const ProbedPosition& probed) {
+std::string PositionText(absl::string_view moves, const ProbedPosition& probed) {
   const Board& board = probed.board;
   const int mover = board.ply() % 2;
   std::string text =
@@ -119,7 +119,7 @@ std::string Figure(absl::string_view moves, const ProbedPosition& probed) {
   return text;
 }
 
-std::string FigureLine(const ReferencePosition& position, const ProbedPosition& probed) {
+std::string PositionLine(const ReferencePosition& position, const ProbedPosition& probed) {
   const int column = probed.move + 1;
   const char* verdict = Contains(position.best, column)          ? "✓"
                         : Contains(position.keeps_value, column) ? "~"

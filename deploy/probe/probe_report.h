@@ -12,10 +12,10 @@ namespace dbr {
 
 // The board, and pi, beta+, beta- and Q of each column as bars; beta in place of beta+ and beta- where the
 // policy has one behaviour. `moves` led to the position.
-std::string Figure(absl::string_view moves, const ProbedPosition& probed);
+std::string PositionText(absl::string_view moves, const ProbedPosition& probed);
 
 // The same in one line, a small column for each move, with the judgement of the move played.
-std::string FigureLine(const ReferencePosition& position, const ProbedPosition& probed);
+std::string PositionLine(const ReferencePosition& position, const ProbedPosition& probed);
 
 std::string SharesText(const ProbeShares& shares);
 

@@ -42,13 +42,13 @@ struct Listing {
 };
 
 // An SVG of the report's folder.
-struct Figure {
+struct Picture {
   std::string file;  // from the report's folder: "plots/x.svg"
   std::string title;
   std::string caption;
 };
 
-using Block = std::variant<Heading, Paragraph, List, Table, Listing, Figure>;
+using Block = std::variant<Heading, Paragraph, List, Table, Listing, Picture>;
 
 struct Document {
   std::string title;

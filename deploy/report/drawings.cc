@@ -26,7 +26,7 @@ bool Drawings::AddScript(const std::string& name, const std::string& title, cons
   std::filesystem::remove(PathOf(name), ignored);  // of an earlier report
   script_ += script;
   has_plots_ = true;
-  document->Add(Figure{absl::StrCat("plots/", name, ".svg"), title, caption});
+  document->Add(Picture{absl::StrCat("plots/", name, ".svg"), title, caption});
   return true;
 }
 
@@ -44,7 +44,7 @@ bool Drawings::Add(const std::string& name, const std::string& title, const std:
 absl::Status Drawings::Add(const std::string& name, const std::string& title, const std::string& caption,
                            const std::string& svg, Document* document) {
   RETURN_IF_ERROR(WriteFileAtomically(PathOf(name), svg));
-  document->Add(Figure{absl::StrCat("plots/", name, ".svg"), title, caption});
+  document->Add(Picture{absl::StrCat("plots/", name, ".svg"), title, caption});
   return absl::OkStatus();
 }
 

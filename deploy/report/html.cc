@@ -82,7 +82,7 @@ class Writer {
   std::string operator()(const Listing& listing) const {
     return Folded(listing.fold, Element("pre", listing.text));
   }
-  std::string operator()(const Figure& figure) {
+  std::string operator()(const Picture& figure) {
     const std::string& svg = svgs_[figures_];
     ++figures_;
     return absl::StrCat("<figure>\n", Inline(svg, figure.title, figures_),

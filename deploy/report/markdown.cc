@@ -48,7 +48,7 @@ struct Writer {
   std::string operator()(const Listing& listing) const {
     return Folded(listing.fold, absl::StrCat("```\n", listing.text, "```\n"));
   }
-  std::string operator()(const Figure& figure) const {
+  std::string operator()(const Picture& figure) const {
     return absl::StrCat("![", Escaped(figure.title), "](", figure.file, ")\n\n", Escaped(figure.caption),
                         "\n");
   }

@@ -46,22 +46,22 @@ void AddOpening(const Runs& runs, const std::string& counts, Document* document)
       "they are.")});
 }
 
-// Takes the place of a figure that was not drawn.
-Block WithoutFigure(const Figure& figure) {
-  return Paragraph{absl::StrCat(figure.title, ": not drawn.")};
+// Takes the place of a picture that was not drawn.
+Block WithoutPicture(const Picture& picture) {
+  return Paragraph{absl::StrCat(picture.title, ": not drawn.")};
 }
 
-// The text of each figure's file; a figure that has none leaves a word in its place.
-std::vector<std::string> ReadFigures(const std::string& folder, Document* document) {
+// The text of each picture's file; a picture that has none leaves a word in its place.
+std::vector<std::string> ReadPictures(const std::string& folder, Document* document) {
   std::vector<std::string> svgs;
   for (Block& block : document->blocks) {
-    const Figure* figure = std::get_if<Figure>(&block);
-    if (figure == nullptr) continue;
-    absl::StatusOr<std::string> svg = ReadFile(absl::StrCat(folder, "/", figure->file));
+    const Picture* picture = std::get_if<Picture>(&block);
+    if (picture == nullptr) continue;
+    absl::StatusOr<std::string> svg = ReadFile(absl::StrCat(folder, "/", picture->file));
     if (svg.ok() && !svg->empty()) {
       svgs.push_back(*std::move(svg));
     } else {
-      block = WithoutFigure(Figure(*figure));
+      block = WithoutPicture(Picture(*picture));
     }
   }
   return svgs;
@@ -94,7 +94,7 @@ absl::StatusOr<ReportOutcome> WriteReport(const ReportOptions& options) {
     document.Add(Heading{2, "Notes"});
     document.Add(List{std::move(notes)});
   }
-  const std::vector<std::string> svgs = ReadFigures(options.out, &document);
+  const std::vector<std::string> svgs = ReadPictures(options.out, &document);
   RETURN_IF_ERROR(WriteFileAtomically(absl::StrCat(options.out, "/report.md"), Markdown(document)));
   RETURN_IF_ERROR(WriteFileAtomically(absl::StrCat(options.out, "/report.html"), Html(document, svgs)));
   return outcome;

@@ -180,7 +180,7 @@ TEST(PositionsFileTest, NamesWhatIsWrong) {
 
 TEST(FigureTest, DrawsTheBoardAndTheBars) {
   const auto probed = Probe(*FullPolicy(), {*Board::FromMoves("4777777")}, MODE, 1);
-  const std::string figure = Figure("4777777", (*probed)[0]);
+  const std::string figure = PositionText("4777777", (*probed)[0]);
   EXPECT_THAT(figure, AllOf(HasSubstr("player 2 (○) to move"), HasSubstr("plays column 6"),
                             HasSubstr("· · · ● · · ○"), HasSubstr("6 ◀"), HasSubstr("full"),
                             HasSubstr("beta-"), HasSubstr("0.50")));
@@ -191,8 +191,8 @@ TEST(FigureTest, ShowsOneBehaviourInPlaceOfTwo) {
   const auto probed = Probe(*policy, {Board()}, MODE, 1);
   ASSERT_TRUE(probed.ok()) << probed.status();
   EXPECT_THAT((*probed)[0].beta, SizeIs(7));
-  EXPECT_THAT(Figure("", (*probed)[0]), AllOf(HasSubstr("beta "), Not(HasSubstr("beta+"))));
-  EXPECT_THAT(FigureLine(Position("", 0, {7}, {7}), (*probed)[0]),
+  EXPECT_THAT(PositionText("", (*probed)[0]), AllOf(HasSubstr("beta "), Not(HasSubstr("beta+"))));
+  EXPECT_THAT(PositionLine(Position("", 0, {7}, {7}), (*probed)[0]),
               AllOf(HasSubstr("│  beta │"), Not(HasSubstr("beta-"))));
   const Json json = ToJson("", (*probed)[0]);
   EXPECT_GT(json["beta"][6].get<double>(), json["beta"][0].get<double>());
@@ -201,9 +201,9 @@ TEST(FigureTest, ShowsOneBehaviourInPlaceOfTwo) {
 
 TEST(FigureTest, OneLineHasTheVerdict) {
   const auto probed = Probe(*FullPolicy(), {Board()}, MODE, 1);
-  EXPECT_THAT(FigureLine(Position("", 0, {7}, {7}), (*probed)[0]), HasSubstr("plays 7 ✓"));
-  EXPECT_THAT(FigureLine(Position("", 0, {6, 7}, {6}), (*probed)[0]), HasSubstr("plays 7 ~"));
-  EXPECT_THAT(FigureLine(Position("must_win", 1, {1}, {1}), (*probed)[0]),
+  EXPECT_THAT(PositionLine(Position("", 0, {7}, {7}), (*probed)[0]), HasSubstr("plays 7 ✓"));
+  EXPECT_THAT(PositionLine(Position("", 0, {6, 7}, {6}), (*probed)[0]), HasSubstr("plays 7 ~"));
+  EXPECT_THAT(PositionLine(Position("must_win", 1, {1}, {1}), (*probed)[0]),
               AllOf(HasSubstr("plays 7 ✗"), HasSubstr("must_win")));
 }
 

@@ -231,8 +231,8 @@ TEST(DocumentTest, TextIsTextInBothForms) {
 
 TEST(DocumentTest, NamesWithinPicturesAreTheirOwnOnAPage) {
   Document document;
-  document.Add(Figure{"plots/a.svg", "A", "one"});
-  document.Add(Figure{"plots/b.svg", "B", "two"});
+  document.Add(Picture{"plots/a.svg", "A", "one"});
+  document.Add(Picture{"plots/b.svg", "B", "two"});
   const std::string svg = "<?xml?><svg ><title>Gnuplot</title><g id='p'/><use href='#p'/></svg>";
   const std::string page = Html(document, {svg, svg});
   EXPECT_THAT(page, AllOf(HasSubstr("id='f1-p'"), HasSubstr("href='#f2-p'"), Not(HasSubstr("Gnuplot")),
