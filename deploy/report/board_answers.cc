@@ -50,8 +50,8 @@ absl::StatusOr<BoardAnswer> AskAboutBoard(const PolicyNetworks& policy, const st
 std::vector<BoardAnswer> BoardAnswers(const Runs& runs, std::vector<std::string>* notes) {
   std::vector<BoardAnswer> answers;
   std::set<int> answered;
-  for (const Cell& cell : runs.cells) {
-    if (cell.state != CellState::kDone || cell.summary.env != "connect4" ||
+  for (const ReportedCell& cell : runs.cells) {
+    if (cell.state != ReportedState::kDone || cell.summary.env != "connect4" ||
         answered.count(cell.contender) > 0)
       continue;
     std::error_code ignored;

@@ -54,49 +54,49 @@ int IndexOf(const google::protobuf::RepeatedPtrField<Named>& list, const std::st
 }
 
 // One that was not run.
-Cell CellAt(int task, int contender, std::uint64_t seed) {
-  Cell cell;
+ReportedCell CellAt(int task, int contender, std::uint64_t seed) {
+  ReportedCell cell;
   cell.task = task;
   cell.contender = contender;
   cell.seed = seed;
   return cell;
 }
 
-CellState CellStateOf(RunState run) {
+ReportedState ReportedStateOf(RunState run) {
   switch (run) {
     case RunState::kNotBegun:
     case RunState::kRunning:
-      return CellState::kRunning;
+      return ReportedState::kRunning;
     case RunState::kInterrupted:
-      return CellState::kStopped;
+      return ReportedState::kStopped;
     case RunState::kFailed:
-      return CellState::kFailed;
+      return ReportedState::kFailed;
     case RunState::kDone:
       break;
   }
-  return CellState::kDone;
+  return ReportedState::kDone;
 }
 
-void ReadSummaryOf(Cell* cell, std::vector<std::string>* notes) {
+void ReadSummaryOf(ReportedCell* cell, std::vector<std::string>* notes) {
   absl::StatusOr<RunSummary> summary = LoadSummary(RunFolder{cell->folder});
   if (summary.ok()) {
     cell->summary = *std::move(summary);
-    cell->state = CellStateOf(StateOf(cell->summary));
+    cell->state = ReportedStateOf(StateOf(cell->summary));
     cell->failure = cell->summary.failure;
     return;
   }
-  cell->state = absl::IsNotFound(summary.status()) ? CellState::kRunning : CellState::kFailed;
-  if (cell->state == CellState::kRunning) return;  // it has just begun
+  cell->state = absl::IsNotFound(summary.status()) ? ReportedState::kRunning : ReportedState::kFailed;
+  if (cell->state == ReportedState::kRunning) return;  // it has just begun
   cell->failure = std::string(summary.status().message());
   notes->push_back(cell->failure);
 }
 
-void ReadSettingsOf(Cell* cell, std::vector<std::string>* notes) {
+void ReadSettingsOf(ReportedCell* cell, std::vector<std::string>* notes) {
   const absl::StatusOr<Settings> settings = LoadSettings(RunFolder{cell->folder}.config());
   if (settings.ok()) {
     cell->settings = settings->differences;
     cell->digest = settings->digest;
-  } else if (cell->state != CellState::kRunning) {
+  } else if (cell->state != ReportedState::kRunning) {
     notes->push_back(std::string(settings.status().message()));
   }
 }
@@ -136,8 +136,8 @@ class Gatherer {
   // together.
   void NoteMixedConfigs() {
     std::map<std::pair<int, int>, std::set<std::string>> digests;
-    for (const Cell& cell : runs_->cells) {
-      if (cell.state == CellState::kDone) digests[{cell.task, cell.contender}].insert(cell.digest);
+    for (const ReportedCell& cell : runs_->cells) {
+      if (cell.state == ReportedState::kDone) digests[{cell.task, cell.contender}].insert(cell.digest);
     }
     for (const auto& [pair, different] : digests) {
       if (different.size() < 2) continue;
@@ -160,13 +160,13 @@ class Gatherer {
       std::uint64_t seed = 0;
       if (!absl::StartsWith(name, kSeedPrefix) || !absl::SimpleAtoi(name.substr(kSeedPrefix.size()), &seed))
         continue;
-      Cell cell = CellAt(task, contender, seed);
+      ReportedCell cell = CellAt(task, contender, seed);
       cell.folder = absl::StrCat(folder, "/", name);
       Take(std::move(cell));
     }
   }
 
-  void Take(Cell cell) {
+  void Take(ReportedCell cell) {
     ReadSummaryOf(&cell, &runs_->notes);
     ReadSettingsOf(&cell, &runs_->notes);
     const CellKey key(cell.task, cell.contender, cell.seed);
@@ -175,14 +175,14 @@ class Gatherer {
       cells_.emplace(key, std::move(cell));
       return;
     }
-    if (found->second.state != CellState::kDone && cell.state == CellState::kDone)
+    if (found->second.state != ReportedState::kDone && cell.state == ReportedState::kDone)
       std::swap(found->second, cell);
     runs_->notes.push_back(
         absl::StrCat(cell.folder, ": left out, for ", found->second.folder, " holds the same cell"));
   }
 
   Runs* runs_;
-  std::map<CellKey, Cell> cells_;
+  std::map<CellKey, ReportedCell> cells_;
 };
 
 absl::Status ReadGridOf(const std::string& run_dir, bool has_grid, Runs* runs) {
@@ -215,17 +215,17 @@ absl::Status ReadGridOf(const std::string& run_dir, bool has_grid, Runs* runs) {
 
 }  // namespace
 
-const char* NameOf(CellState state) {
+const char* NameOf(ReportedState state) {
   switch (state) {
-    case CellState::kNotRun:
+    case ReportedState::kNotRun:
       return "not run";
-    case CellState::kRunning:
+    case ReportedState::kRunning:
       return "running";
-    case CellState::kStopped:
+    case ReportedState::kStopped:
       return "stopped";
-    case CellState::kFailed:
+    case ReportedState::kFailed:
       return "failed";
-    case CellState::kDone:
+    case ReportedState::kDone:
       return "done";
   }
   return "";

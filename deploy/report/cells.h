@@ -12,7 +12,7 @@
 
 namespace dbr::report {
 
-enum class CellState {
+enum class ReportedState {
   kNotRun,   // there is no folder
   kRunning,  // it has begun and has not ended
   kStopped,  // it was interrupted
@@ -21,14 +21,14 @@ enum class CellState {
 };
 
 // "not run", "running", "stopped", "failed", "done".
-const char* NameOf(CellState state);
+const char* NameOf(ReportedState state);
 
-struct Cell {
+struct ReportedCell {
   int task = 0;       // index in the grid
   int contender = 0;  // index in the grid
   std::uint64_t seed = 0;
   std::string folder;  // RUN_DIR/TASK/CONTENDER/seed-N; empty for one that was not run
-  CellState state = CellState::kNotRun;
+  ReportedState state = ReportedState::kNotRun;
   std::string failure;   // of a failed one
   RunSummary summary;    // where one could be read
   std::string settings;  // its config's fields that are not at their defaults, but for the seed, one a line
@@ -38,9 +38,9 @@ struct Cell {
 
 struct Runs {
   Experiment grid;
-  std::string scale;               // empty: not known
-  std::vector<Cell> cells;         // in the grid's order: by task, by contender, by seed
-  std::vector<std::string> notes;  // what a reader must know: damaged files, folders that no grid knows
+  std::string scale;                // empty: not known
+  std::vector<ReportedCell> cells;  // in the grid's order: by task, by contender, by seed
+  std::vector<std::string> notes;   // what a reader must know: damaged files, folders that no grid knows
 };
 
 // Reads the experiments' folders (RUN_DIR/TASK/CONTENDER/seed-N/{summary.json, config.textproto}). The grid

@@ -41,8 +41,8 @@ double At(const Track& track, double x) {
 
 Curve MakeCurve(const Runs& runs, int task, int contender, const std::string& opponent, Axis axis) {
   std::vector<Track> tracks;
-  for (const Cell& cell : runs.cells) {
-    if (cell.task != task || cell.contender != contender || cell.state != CellState::kDone) continue;
+  for (const ReportedCell& cell : runs.cells) {
+    if (cell.task != task || cell.contender != contender || cell.state != ReportedState::kDone) continue;
     Track track = TrackOf(cell.summary, opponent, axis);
     if (!track.empty()) tracks.push_back(std::move(track));
   }

@@ -78,7 +78,7 @@ BarPanel BesidePublished(const Runs& runs, const Row& row) {
 
 // The mean return of the data that a task's runs started from, as the first of them has it.
 std::optional<double> ReturnOfData(const Runs& runs, int task) {
-  for (const Cell& cell : runs.cells) {
+  for (const ReportedCell& cell : runs.cells) {
     if (cell.task == task && cell.summary.seed_buffer.rows > 0 &&
         std::isfinite(cell.summary.seed_buffer.return_mean))
       return cell.summary.seed_buffer.return_mean;

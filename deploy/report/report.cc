@@ -26,11 +26,11 @@ absl::Status MakeFolder(const std::string& path) {
 
 std::string CountsOf(const Runs& runs) {
   std::array<int, 5> counts = {};
-  for (const Cell& cell : runs.cells) ++counts[static_cast<int>(cell.state)];
+  for (const ReportedCell& cell : runs.cells) ++counts[static_cast<int>(cell.state)];
   std::string text =
-      absl::StrCat(counts[static_cast<int>(CellState::kDone)], " of ", runs.cells.size(), " cells done");
-  for (const CellState state :
-       {CellState::kRunning, CellState::kStopped, CellState::kFailed, CellState::kNotRun}) {
+      absl::StrCat(counts[static_cast<int>(ReportedState::kDone)], " of ", runs.cells.size(), " cells done");
+  for (const ReportedState state :
+       {ReportedState::kRunning, ReportedState::kStopped, ReportedState::kFailed, ReportedState::kNotRun}) {
     const int count = counts[static_cast<int>(state)];
     if (count > 0) absl::StrAppend(&text, ", ", count, " ", NameOf(state));
   }

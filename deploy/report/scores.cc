@@ -14,11 +14,11 @@
 namespace dbr::report {
 namespace {
 
-constexpr CellState kUnfinished[] = {CellState::kFailed, CellState::kStopped, CellState::kRunning,
-                                     CellState::kNotRun};
+constexpr ReportedState kUnfinished[] = {ReportedState::kFailed, ReportedState::kStopped,
+                                         ReportedState::kRunning, ReportedState::kNotRun};
 constexpr std::uint64_t kBootstrapSeed = 1;
 
-const EvaluationResult* FinalOf(const Cell& cell, const Measure& measure) {
+const EvaluationResult* FinalOf(const ReportedCell& cell, const Measure& measure) {
   for (const EvaluationResult& result : cell.summary.final_results) {
     if (measure.opponent().empty() || result.opponent == measure.opponent()) return &result;
   }
@@ -43,13 +43,13 @@ void Summarise(const std::vector<std::vector<double>>& strata, Rng rng, Sample* 
 Row MakeRow(const Runs& runs, int task, const Measure& measure, std::uint64_t stream) {
   Row row = EmptyRow(runs, task, measure);
   row.score = runs.grid.task(task).kind() == Task::GAMES;
-  for (const Cell& cell : runs.cells) {
+  for (const ReportedCell& cell : runs.cells) {
     if (cell.task != task) continue;
     Sample& sample = row.samples[cell.contender];
     const double value = FinalMean(cell, measure);
     // An evaluation that lacks this opponent has ended before this figure.
-    const bool short_of_it = cell.state == CellState::kDone && !std::isfinite(value);
-    ++sample.cells[static_cast<int>(short_of_it ? CellState::kStopped : cell.state)];
+    const bool short_of_it = cell.state == ReportedState::kDone && !std::isfinite(value);
+    ++sample.cells[static_cast<int>(short_of_it ? ReportedState::kStopped : cell.state)];
     if (std::isfinite(value)) sample.values.push_back(value);
   }
   const Rng rng = Rng(kBootstrapSeed).Fork(stream);
@@ -63,7 +63,7 @@ using Strata = std::map<std::pair<int, int>, std::vector<double>>;
 
 Strata RunsOfScores(const Runs& runs, const std::vector<Row>& rows) {
   Strata strata;
-  for (const Cell& cell : runs.cells) {
+  for (const ReportedCell& cell : runs.cells) {
     std::vector<double> scores;
     for (const Row& row : rows) {
       if (row.score && row.task == cell.task) scores.push_back(FinalMean(cell, row.measure));
@@ -76,7 +76,7 @@ Strata RunsOfScores(const Runs& runs, const std::vector<Row>& rows) {
 
 std::string Unfinished(const Sample& sample) {
   std::vector<std::string> parts;
-  for (const CellState state : kUnfinished) {
+  for (const ReportedState state : kUnfinished) {
     if (sample.count(state) > 0) parts.push_back(absl::StrCat(sample.count(state), " ", NameOf(state)));
   }
   return absl::StrJoin(parts, ", ");
@@ -88,8 +88,8 @@ int Sample::all() const {
   return std::accumulate(cells.begin(), cells.end(), 0);
 }
 
-double FinalMean(const Cell& cell, const Measure& measure) {
-  const EvaluationResult* result = cell.state == CellState::kDone ? FinalOf(cell, measure) : nullptr;
+double FinalMean(const ReportedCell& cell, const Measure& measure) {
+  const EvaluationResult* result = cell.state == ReportedState::kDone ? FinalOf(cell, measure) : nullptr;
   if (result == nullptr) return kNoNumber;
   return std::isfinite(result->score_mean) ? result->score_mean : result->return_mean;
 }
@@ -128,7 +128,7 @@ std::optional<Row> OverAllScores(const Runs& runs, const std::vector<Row>& rows)
     Sample& sample = overall.samples[c];
     for (const std::vector<double>& stratum : of_tasks)
       sample.values.insert(sample.values.end(), stratum.begin(), stratum.end());
-    sample.cells[static_cast<int>(CellState::kDone)] = static_cast<int>(sample.values.size());
+    sample.cells[static_cast<int>(ReportedState::kDone)] = static_cast<int>(sample.values.size());
     Summarise(of_tasks, rng.Fork(c), &sample);
   }
   return overall;

@@ -21,9 +21,9 @@ struct Sample {
   double std = kNoNumber;  // over seeds; NaN for one
   double iqm = kNoNumber;
   Interval interval = {kNoNumber, kNoNumber};  // 95%, of the IQM; NaN for one seed
-  std::array<int, 5> cells = {};               // how many are in each CellState
+  std::array<int, 5> cells = {};               // how many are in each ReportedState
 
-  int count(CellState state) const { return cells[static_cast<int>(state)]; }
+  int count(ReportedState state) const { return cells[static_cast<int>(state)]; }
   int all() const;  // cells that there should be; 0: the contender does not take part
 };
 
@@ -43,7 +43,7 @@ std::vector<Row> MakeRows(const Runs& runs);
 std::optional<Row> OverAllScores(const Runs& runs, const std::vector<Row>& rows);
 
 // What the measure's final evaluation of a run came to; NaN where it has none.
-double FinalMean(const Cell& cell, const Measure& measure);
+double FinalMean(const ReportedCell& cell, const Measure& measure);
 
 // The figure that was published of a contender, or null.
 const Published* PublishedOf(const Measure& measure, const std::string& contender);

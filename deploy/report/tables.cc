@@ -68,7 +68,7 @@ Table MakeTable(const Runs& runs, const std::vector<Row>& rows, const std::vecto
   return table;
 }
 
-std::vector<TableCell> CellLine(const Runs& runs, const Cell& cell, bool first_of_task) {
+std::vector<TableCell> CellLine(const Runs& runs, const ReportedCell& cell, bool first_of_task) {
   const RunSummary& summary = cell.summary;
   std::vector<std::string> texts = {first_of_task ? runs.grid.task(cell.task).name() : "",
                                     runs.grid.contender(cell.contender).name(), absl::StrCat(cell.seed),
@@ -89,8 +89,8 @@ std::vector<TableCell> CellLine(const Runs& runs, const Cell& cell, bool first_o
 
 void AddFailures(const Runs& runs, Document* document) {
   List failures;
-  for (const Cell& cell : runs.cells) {
-    if (cell.state != CellState::kFailed) continue;
+  for (const ReportedCell& cell : runs.cells) {
+    if (cell.state != ReportedState::kFailed) continue;
     failures.items.push_back(absl::StrCat(runs.grid.task(cell.task).name(), ", ",
                                           runs.grid.contender(cell.contender).name(), ", seed ", cell.seed,
                                           ": ", cell.failure.empty() ? "it does not say why" : cell.failure));
@@ -154,7 +154,7 @@ void AddCells(const Runs& runs, Document* document) {
   table.header = {"task",         "contender", "seed",  "state", "ended", "commit",
                   "time (h:m:s)", "updates",   "steps", "games", "config"};
   int task = -1;
-  for (const Cell& cell : runs.cells) {
+  for (const ReportedCell& cell : runs.cells) {
     table.rows.push_back(CellLine(runs, cell, cell.task != task));
     task = cell.task;
   }
@@ -165,14 +165,14 @@ void AddSettings(const Runs& runs, Document* document) {
   document->Add(Heading{2, "Settings"});
   document->Add(
       Paragraph{"What each task's and contender's config sets, beside the schema's defaults and the seed."});
-  std::map<std::pair<int, int>, std::map<std::string, std::vector<const Cell*>>> by_digest;
-  for (const Cell& cell : runs.cells) {
+  std::map<std::pair<int, int>, std::map<std::string, std::vector<const ReportedCell*>>> by_digest;
+  for (const ReportedCell& cell : runs.cells) {
     if (!cell.digest.empty()) by_digest[{cell.task, cell.contender}][cell.digest].push_back(&cell);
   }
   for (const auto& [place, configs] : by_digest) {
     for (const auto& [digest, cells] : configs) {
       const std::string seeds = absl::StrJoin(
-          cells, ", ", [](std::string* out, const Cell* cell) { absl::StrAppend(out, cell->seed); });
+          cells, ", ", [](std::string* out, const ReportedCell* cell) { absl::StrAppend(out, cell->seed); });
       document->Add(
           Listing{absl::StrCat(runs.grid.task(place.first).name(), " · ",
                                runs.grid.contender(place.second).name(), " · config ", digest,

@@ -138,7 +138,7 @@ TEST_F(ReportTest, ACellThatTwoFoldersHoldCountsOnce) {
   ASSERT_TRUE(runs.ok()) << runs.status();
   EXPECT_EQ(runs->cells.size(), 10);
   EXPECT_THAT(runs->notes, ElementsAre(HasSubstr("holds the same cell")));
-  for (const Cell& cell : runs->cells) EXPECT_EQ(cell.state, CellState::kDone);
+  for (const ReportedCell& cell : runs->cells) EXPECT_EQ(cell.state, ReportedState::kDone);
 }
 
 TEST_F(ReportTest, SaysWhereSeedsOfSeveralConfigsOrScalesAreTakenTogether) {

@@ -29,9 +29,9 @@ using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::SizeIs;
 
-Cell Finished(std::vector<EvaluationPoint> points) {
-  Cell cell;
-  cell.state = CellState::kDone;
+ReportedCell Finished(std::vector<EvaluationPoint> points) {
+  ReportedCell cell;
+  cell.state = ReportedState::kDone;
   cell.summary.curve = EvaluationCurve(std::move(points));
   return cell;
 }
@@ -64,7 +64,7 @@ TEST(CurveTest, LeavesOutOtherOpponentsAndRunsThatAreNotDone) {
   EvaluationPoint random = At(100, 1);
   random.opponent = "random";
   runs.cells = {Finished({random, other}), Finished({other})};
-  runs.cells[1].state = CellState::kRunning;
+  runs.cells[1].state = ReportedState::kRunning;
   EXPECT_THAT(MakeCurve(runs, 0, 0, "random", Axis::kUpdates).mean, ElementsAre(1));
   EXPECT_THAT(MakeCurve(runs, 0, 0, "one_ply", Axis::kUpdates).x, IsEmpty());
   EXPECT_THAT(MakeCurve(runs, 1, 0, "", Axis::kUpdates).x, IsEmpty());
