@@ -43,7 +43,7 @@ ExperimentRun::ExperimentRun(Grid grid, ExperimentOptions options, std::FILE* ou
     : title_(absl::StrCat("experiment ", grid.name, " at scale ", grid.scale)),
       run_dir_(grid.run_dir),
       options_(std::move(options)),
-      board_(out, kLineEvery) {
+      screen_(out, kLineEvery) {
   for (Cell& cell : grid.cells) {
     entries_.emplace_back();
     entries_.back().cell = std::move(cell);
@@ -60,12 +60,12 @@ absl::StatusOr<int> ExperimentRun::Run() {
     StartDue();
     if (running_.empty()) break;
     ReadProgress();
-    board_.Update(State(), absl::Now());
+    screen_.Update(State(), absl::Now());
     RETURN_IF_ERROR(supervisor_->Wait(absl::Now() + kLookEvery));
     TakeEnded();
   }
   if (!running_.empty())
-    board_.Say("stopping; the running cells save everything first (another Ctrl-C kills them)");
+    screen_.Say("stopping; the running cells save everything first (another Ctrl-C kills them)");
   supervisor_->Stop();
   TakeEnded();
   const bool signalled = supervisor_->stop_signals() > 0;
@@ -86,12 +86,12 @@ void ExperimentRun::Survey() {
 }
 
 void ExperimentRun::Announce() {
-  board_.Say(absl::StrCat(title_, ": ", entries_.size(), entries_.size() == 1 ? " cell" : " cells", ", ",
-                          Count(Outcome::kDone), " done already, ", Count(Outcome::kWaiting), " to run",
-                          options_.capacity.jobs > 0
-                              ? absl::StrCat(", ", options_.capacity.jobs, " at once")
-                              : absl::StrCat(" on ", options_.capacity.cores, " cores"),
-                          "; Ctrl-C stops and saves\nrun folder: ", run_dir_));
+  screen_.Say(absl::StrCat(title_, ": ", entries_.size(), entries_.size() == 1 ? " cell" : " cells", ", ",
+                           Count(Outcome::kDone), " done already, ", Count(Outcome::kWaiting), " to run",
+                           options_.capacity.jobs > 0
+                               ? absl::StrCat(", ", options_.capacity.jobs, " at once")
+                               : absl::StrCat(" on ", options_.capacity.cores, " cores"),
+                           "; Ctrl-C stops and saves\nrun folder: ", run_dir_));
 }
 
 // True where the cell needs no run, or may have none.
@@ -112,7 +112,7 @@ bool ExperimentRun::Settle(Entry* entry, const CellStanding& standing) {
   } else {
     absl::StrAppend(&text, entry->cell.folder, " is in use by another launch");
   }
-  board_.Say(text);
+  screen_.Say(text);
   return true;
 }
 
@@ -140,13 +140,13 @@ absl::Status ExperimentRun::Start(Entry* entry) {
   if (!resume) {
     RETURN_IF_ERROR(CheckSeedBufferIsThere(cell));
     ASSIGN_OR_RETURN(const std::string aside, MoveAside(cell, run_dir_));
-    if (!aside.empty()) board_.Say(absl::StrCat(cell.name(), ": what was there is now in ", aside));
+    if (!aside.empty()) screen_.Say(absl::StrCat(cell.name(), ": what was there is now in ", aside));
   }
   RETURN_IF_ERROR(PrepareCell(cell));
   RETURN_IF_ERROR(Launch(cell, resume));
   entry->outcome = Outcome::kRunning;
   entry->started = absl::Now();
-  board_.Say(absl::StrCat(resume ? "continuing " : "started ", cell.name()));
+  screen_.Say(absl::StrCat(resume ? "continuing " : "started ", cell.name()));
   return absl::OkStatus();
 }
 
@@ -180,16 +180,16 @@ void ExperimentRun::Judge(Entry* entry, const EndedProcess& ended) {
     const absl::Duration took = absl::Now() - entry->started;
     entry->outcome = Outcome::kDone;
     durations_.Add(cell, took + absl::Seconds(entry->before.wall_s));
-    board_.Say(absl::StrCat("done ", cell.name(), " in ", Clock(took), ": ", ResultText(standing.summary)));
+    screen_.Say(absl::StrCat("done ", cell.name(), " in ", Clock(took), ": ", ResultText(standing.summary)));
     if (options_.keep_stores) return;
     if (const absl::Status removed = RemoveStores(cell); !removed.ok())
-      board_.Say(std::string(removed.message()));
+      screen_.Say(std::string(removed.message()));
     return;
   }
   if (supervisor_->stop_signals() > 0 && WasStopped(ended.wait_status)) {
     entry->outcome = Outcome::kWaiting;
     if (WIFSIGNALED(ended.wait_status))
-      board_.Say(absl::StrCat("killed ", cell.name(), ": it goes on from its last checkpoint"));
+      screen_.Say(absl::StrCat("killed ", cell.name(), ": it goes on from its last checkpoint"));
     return;
   }
   const std::string words = LogTail(cell.log(), ended.log_start, kLastLines);
@@ -200,7 +200,7 @@ void ExperimentRun::Judge(Entry* entry, const EndedProcess& ended) {
 
 void ExperimentRun::Fail(Entry* entry, const std::string& why) {
   entry->outcome = Outcome::kFailed;
-  board_.Say(absl::StrCat("FAILED ", entry->cell.name(), ": ", why, "\n  whole log: ", entry->cell.log()));
+  screen_.Say(absl::StrCat("FAILED ", entry->cell.name(), ": ", why, "\n  whole log: ", entry->cell.log()));
 }
 
 void ExperimentRun::ReadProgress() {
@@ -216,8 +216,8 @@ void ExperimentRun::ReadProgress() {
   }
 }
 
-BoardState ExperimentRun::State() const {
-  BoardState state;
+GridStatus ExperimentRun::State() const {
+  GridStatus state;
   for (const auto& [name, index] : running_)
     state.running.push_back({name, ProgressOf(entries_[index].cell.config, entries_[index].newest)});
   state.all = static_cast<int>(entries_.size());
@@ -260,7 +260,7 @@ int ExperimentRun::Count(Outcome outcome) const {
 }
 
 int ExperimentRun::Conclude(bool signalled) {
-  board_.End();
+  screen_.End();
   const int failed = Count(Outcome::kFailed), left_alone = Count(Outcome::kLeftAlone);
   const int waiting = Count(Outcome::kWaiting);
   std::string text =
@@ -271,7 +271,7 @@ int ExperimentRun::Conclude(bool signalled) {
   for (const Entry& entry : entries_) {
     if (entry.outcome == Outcome::kFailed) absl::StrAppend(&text, "\n  failed: ", entry.cell.log());
   }
-  board_.Say(absl::StrCat(text, "\nrun folder: ", run_dir_));
+  screen_.Say(absl::StrCat(text, "\nrun folder: ", run_dir_));
   if (signalled && waiting > 0) return kInterruptedExit;
   return failed > 0 || left_alone > 0 ? 1 : 0;
 }

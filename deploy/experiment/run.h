@@ -13,11 +13,11 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
-#include "deploy/experiment/board.h"
 #include "deploy/experiment/cell.h"
 #include "deploy/experiment/grid.h"
 #include "deploy/experiment/progress.h"
 #include "deploy/experiment/schedule.h"
+#include "deploy/experiment/status_screen.h"
 #include "deploy/process/supervisor.h"
 
 namespace dbr {
@@ -63,7 +63,7 @@ class ExperimentRun {
   void Fail(Entry* entry, const std::string& why);
 
   void ReadProgress();
-  BoardState State() const;
+  GridStatus State() const;
   std::optional<absl::Duration> TimeLeft() const;
   int Count(Outcome outcome) const;
   int Conclude(bool signalled);
@@ -71,7 +71,7 @@ class ExperimentRun {
   const std::string title_;  // "experiment paper at scale short"
   const std::string run_dir_;
   const ExperimentOptions options_;
-  Board board_;
+  StatusScreen screen_;
   std::vector<Entry> entries_;
   std::map<std::string, std::size_t> running_;  // entries by the cell's name
   std::unique_ptr<Schedule> schedule_;          // of all entries

@@ -1,4 +1,4 @@
-// The order of cells, how long they take, and the board that tells of it.
+// The order of cells, how long they take, and the screen that tells of it.
 #include "deploy/experiment/schedule.h"
 
 #include <gmock/gmock.h>
@@ -6,8 +6,8 @@
 
 #include <string>
 
-#include "deploy/experiment/board.h"
 #include "deploy/experiment/progress.h"
+#include "deploy/experiment/status_screen.h"
 #include "deploy/terminal/terminal.h"
 
 namespace dbr {
@@ -142,8 +142,8 @@ TEST(CellProgressTest, TellsThePhaseAndTheNewestEvaluation) {
   EXPECT_EQ(ProgressOf(config, summary).phase, "saving");
 }
 
-BoardState TwoRunning() {
-  BoardState state;
+GridStatus TwoRunning() {
+  GridStatus state;
   state.running = {{"hopper-medium/dbr/seed-1",
                     {.phase = "training",
                      .amount = "12,000 of 30,000 updates",
@@ -157,42 +157,42 @@ BoardState TwoRunning() {
   return state;
 }
 
-TEST(BoardTest, ShowsTheTotalsAndALineForEachRunningCell) {
+TEST(StatusScreenTest, ShowsTheTotalsAndALineForEachRunningCell) {
   EXPECT_THAT(
-      BoardLines(TwoRunning(), 120, 20),
+      StatusLines(TwoRunning(), 120, 20),
       ElementsAre("12 of 45 done · 2 running · 31 waiting · time left not known yet",
                   "  hopper-medium/dbr/seed-1  training    ████▊         40%  12,000 of 30,000 updates · "
                   "return 812.3 · 1:30 left",
                   "  connect4/sac/seed-2       starting  "));
 }
 
-TEST(BoardTest, CountsWhatWentWrongWhereSomethingDid) {
-  BoardState state = TwoRunning();
+TEST(StatusScreenTest, CountsWhatWentWrongWhereSomethingDid) {
+  GridStatus state = TwoRunning();
   state.failed = 1;
   state.left_alone = 2;
   state.left = absl::Hours(3);
-  EXPECT_EQ(BoardTotals(state),
+  EXPECT_EQ(StatusTotals(state),
             "12 of 45 done · 2 running · 31 waiting · 1 failed · 2 left alone · 3:00:00 left");
 }
 
-TEST(BoardTest, KeepsWithinTheTerminal) {
-  BoardState state = TwoRunning();
+TEST(StatusScreenTest, KeepsWithinTheTerminal) {
+  GridStatus state = TwoRunning();
   for (int i = 0; i < 10; ++i) state.running.push_back(state.running[0]);
-  const std::vector<std::string> lines = BoardLines(state, 40, 5);
+  const std::vector<std::string> lines = StatusLines(state, 40, 5);
   EXPECT_THAT(lines, SizeIs(5));
   EXPECT_EQ(lines.back(), "  and 9 more");
   for (const std::string& line : lines) EXPECT_LE(DisplayWidth(line), 40);
 }
 
-TEST(BoardTest, WritesALineNowAndThenWhereThereIsNoTerminal) {
+TEST(StatusScreenTest, WritesALineNowAndThenWhereThereIsNoTerminal) {
   std::FILE* file = std::tmpfile();
   const absl::Time start = absl::FromUnixSeconds(1000);
-  Board board(file, absl::Minutes(1));
-  board.Update(TwoRunning(), start);
-  board.Say("done x");
-  board.Update(TwoRunning(), start + absl::Seconds(59));
-  board.Update(TwoRunning(), start + absl::Seconds(61));
-  board.End();
+  StatusScreen screen(file, absl::Minutes(1));
+  screen.Update(TwoRunning(), start);
+  screen.Say("done x");
+  screen.Update(TwoRunning(), start + absl::Seconds(59));
+  screen.Update(TwoRunning(), start + absl::Seconds(61));
+  screen.End();
   std::rewind(file);
   std::string text(4096, '\0');
   text.resize(std::fread(text.data(), 1, text.size(), file));

@@ -1,4 +1,4 @@
-// The table of a grid's progress.
+// How a grid of runs is going, on a terminal or as lines of a log.
 #pragma once
 
 #include <cstdio>
@@ -11,38 +11,39 @@
 
 namespace dbr {
 
-struct BoardRow {
-  std::string cell;
+// A running cell.
+struct StatusRow {
+  std::string cell;  // its name
   CellProgress progress;
 };
 
-// What the board tells. The counts are of cells.
-struct BoardState {
-  std::vector<BoardRow> running;
+// What is told of a grid. The counts are of cells.
+struct GridStatus {
+  std::vector<StatusRow> running;
   int all = 0, done = 0, waiting = 0, failed = 0;
   int left_alone = 0;                  // of another config, or in use by another launch
   std::optional<absl::Duration> left;  // until all are done; empty: not known yet
 };
 
-// "12 of 45 done · 2 running · 31 waiting · 3:12:40 left", and failed and left-alone ones where there are
-// some.
-std::string BoardTotals(const BoardState& state);
+// "12 of 45 done · 2 running · 31 waiting · 3:12:40 left", with the failed and the left-alone ones where
+// there are some.
+std::string StatusTotals(const GridStatus& state);
 
 // The totals, and a line for each running cell: name, phase, how far of how much, newest evaluation, time
 // left. At most `width` cells wide, and `height` lines, the last of which then says how many more there are.
-std::vector<std::string> BoardLines(const BoardState& state, int width, int height);
+std::vector<std::string> StatusLines(const GridStatus& state, int width, int height);
 
-// Writes it: in place on a terminal, else the totals and how far each running cell is as one line now and
-// then. One thread.
-class Board {
+// Keeps the status in place at the bottom of a terminal; where the output is none, writes the totals and how
+// far each running cell is as one line now and then. One thread. The stream must outlive it.
+class StatusScreen {
  public:
   // `every`: how often at most a line is written where `out` is no terminal.
-  Board(std::FILE* out, absl::Duration every);
+  StatusScreen(std::FILE* out, absl::Duration every);
 
-  void Update(const BoardState& state, absl::Time now);
-  // Lines of their own above the board.
+  void Update(const GridStatus& state, absl::Time now);
+  // Writes lines of their own above the status.
   void Say(const std::string& text);
-  // Takes the board off the screen.
+  // Takes the status off the terminal.
   void End();
 
  private:

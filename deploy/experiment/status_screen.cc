@@ -1,4 +1,4 @@
-#include "deploy/experiment/board.h"
+#include "deploy/experiment/status_screen.h"
 
 #include <algorithm>
 #include <utility>
@@ -20,7 +20,7 @@ std::string Left(const std::optional<absl::Duration>& left) {
   return left.has_value() ? absl::StrCat(Clock(*left), " left") : "time left not known yet";
 }
 
-std::string RowText(const BoardRow& row, int name_width) {
+std::string RowText(const StatusRow& row, int name_width) {
   const CellProgress& progress = row.progress;
   std::string text = absl::StrCat("  ", PadRight(row.cell, name_width), "  ", PadRight(progress.phase, 10));
   if (progress.amount.empty()) return text;
@@ -32,16 +32,16 @@ std::string RowText(const BoardRow& row, int name_width) {
 }
 
 // For an output that keeps all lines.
-std::string OneLine(const BoardState& state) {
+std::string OneLine(const GridStatus& state) {
   std::vector<std::string> parts;
-  for (const BoardRow& row : state.running)
+  for (const StatusRow& row : state.running)
     parts.push_back(absl::StrCat(row.cell, " ", row.progress.phase, " ", Percent(row.progress.fraction)));
-  return absl::StrCat(BoardTotals(state), parts.empty() ? "" : "; ", absl::StrJoin(parts, ", "));
+  return absl::StrCat(StatusTotals(state), parts.empty() ? "" : "; ", absl::StrJoin(parts, ", "));
 }
 
 }  // namespace
 
-std::string BoardTotals(const BoardState& state) {
+std::string StatusTotals(const GridStatus& state) {
   std::string text = absl::StrCat(state.done, " of ", state.all, " done · ", state.running.size(),
                                   " running · ", state.waiting, " waiting");
   if (state.failed > 0) absl::StrAppend(&text, " · ", state.failed, " failed");
@@ -49,10 +49,10 @@ std::string BoardTotals(const BoardState& state) {
   return absl::StrCat(text, " · ", Left(state.left));
 }
 
-std::vector<std::string> BoardLines(const BoardState& state, int width, int height) {
+std::vector<std::string> StatusLines(const GridStatus& state, int width, int height) {
   int name_width = 0;
-  for (const BoardRow& row : state.running) name_width = std::max(name_width, DisplayWidth(row.cell));
-  std::vector<std::string> lines = {Truncate(BoardTotals(state), width)};
+  for (const StatusRow& row : state.running) name_width = std::max(name_width, DisplayWidth(row.cell));
+  std::vector<std::string> lines = {Truncate(StatusTotals(state), width)};
   const int room = std::max(1, height - 1);
   const int rows = static_cast<int>(state.running.size());
   const int shown = rows <= room ? rows : room - 1;
@@ -61,14 +61,14 @@ std::vector<std::string> BoardLines(const BoardState& state, int width, int heig
   return lines;
 }
 
-Board::Board(std::FILE* out, absl::Duration every)
+StatusScreen::StatusScreen(std::FILE* out, absl::Duration every)
     : out_(out), terminal_(IsTerminal(fileno(out))), every_(every) {}
 
-void Board::Update(const BoardState& state, absl::Time now) {
+void StatusScreen::Update(const GridStatus& state, absl::Time now) {
   if (terminal_) {
     // A cell and a line are left free: some terminals wrap or scroll when the last one is written.
     Erase();
-    lines_ = BoardLines(state, TerminalWidth(fileno(out_), 80) - 1, TerminalHeight(fileno(out_), 24) - 1);
+    lines_ = StatusLines(state, TerminalWidth(fileno(out_), 80) - 1, TerminalHeight(fileno(out_), 24) - 1);
     Draw();
   } else {
     if (now - last_ < every_) return;
@@ -78,24 +78,24 @@ void Board::Update(const BoardState& state, absl::Time now) {
   std::fflush(out_);
 }
 
-void Board::Say(const std::string& text) {
+void StatusScreen::Say(const std::string& text) {
   Erase();
   std::fprintf(out_, "%s\n", text.c_str());
   Draw();
   std::fflush(out_);
 }
 
-void Board::End() {
+void StatusScreen::End() {
   Erase();
   lines_.clear();
   std::fflush(out_);
 }
 
-void Board::Erase() {
+void StatusScreen::Erase() {
   if (!lines_.empty()) std::fprintf(out_, "\033[%zuA\r\033[J", lines_.size());
 }
 
-void Board::Draw() {
+void StatusScreen::Draw() {
   for (const std::string& line : lines_) std::fprintf(out_, "%s\n", line.c_str());
 }
 
