@@ -144,4 +144,16 @@ absl::StatusOr<EvaluationResult> Evaluate(const PolicyNetworks& policy, const Ev
   return player.Result();
 }
 
+absl::StatusOr<std::vector<EvaluationResult>> EvaluateAgainst(const PolicyNetworks& policy,
+                                                              const std::vector<std::string>& opponents,
+                                                              EvaluationOptions options,
+                                                              const std::atomic<bool>* cancelled) {
+  std::vector<EvaluationResult> results;
+  for (const std::string& opponent : opponents) {
+    options.opponent = opponent;
+    ASSIGN_OR_RETURN(results.emplace_back(), Evaluate(policy, options, cancelled));
+  }
+  return results;
+}
+
 }  // namespace dbr

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
@@ -12,8 +13,11 @@
 
 namespace dbr {
 
-// Of an evaluation: more would run into the next seed's episodes.
+// An evaluation has this many episodes at most: more would run into the next seed's episodes.
 inline constexpr int kMaxEpisodes = 1 << 20;
+
+// That many episodes are played side by side, with one forward pass a step.
+inline constexpr int kEvaluationColumns = 64;
 
 struct EvaluationOptions {
   std::string opponent;  // empty where the environment has none
@@ -30,25 +34,31 @@ struct EvaluationResult {
   std::uint64_t seed = 0;
   double score_mean = 0;  // NaN, and its error too, where the environment has no score
   double score_stderr = 0;
-  double return_mean = 0;  // of undiscounted sums of rewards
+  double return_mean = 0;  // an episode's return is the undiscounted sum of its rewards
   double return_stderr = 0;
-  double return_std = 0;  // of single episodes; NaN for one alone
+  double return_std = 0;  // over single episodes; NaN for one alone
   double return_min = 0;
   double return_max = 0;
-  double length_mean = 0;  // steps of the agent
+  double length_mean = 0;  // steps of the agent in an episode
 };
 
 // Plays exactly `episodes` episodes; episode k has the environment seed `seed * kMaxEpisodes + k`, so that a
 // two-player game starts with each side in turn, the agent first. Episodes run in groups of
-// kEvaluationColumns with one forward pass a step and one random stream a group: the result depends on the
-// policy, the seed and the mode alone, to the last bit on one kind of processor, and the first n episodes of
-// a longer evaluation are those of a shorter one. Blocks until all are played, or ends with Cancelled soon
+// kEvaluationColumns with one random stream a group: the result depends on the policy, the seed and the mode
+// alone, to the last bit on one kind of processor, and the first n episodes of a longer evaluation are those
+// of a shorter one. Blocks until all are played, or ends with Cancelled soon
 // after `cancelled` (may be null) becomes true. Other errors: InvalidArgument for an unknown environment or
 // opponent, a policy that does not fit it, a mode whose networks the policy lacks, or a number of episodes
 // outside [1, kMaxEpisodes]; Internal for a policy that gives values not finite.
-inline constexpr int kEvaluationColumns = 64;
 absl::StatusOr<EvaluationResult> Evaluate(const PolicyNetworks& policy, const EvaluationOptions& options,
                                           const std::atomic<bool>* cancelled = nullptr);
+
+// The results of Evaluate() against each of `opponents` in turn, in place of options.opponent; {""} stands
+// for an environment without opponents. The first error ends it.
+absl::StatusOr<std::vector<EvaluationResult>> EvaluateAgainst(const PolicyNetworks& policy,
+                                                              const std::vector<std::string>& opponents,
+                                                              EvaluationOptions options,
+                                                              const std::atomic<bool>* cancelled = nullptr);
 
 // A mean and its standard error sqrt(sum (x - mean)^2 / (n - 1) / n): NaN for a single value, both NaN for
 // none.

@@ -81,24 +81,20 @@ absl::StatusOr<int> RunEvaluate(const EvaluateFlags& flags) {
   if (flags.opponent.empty()) opponents = OpponentsToEvaluate(policy->spec().env, {});
   if (flags.json) opponents.resize(1);
   const Interrupt interrupt;
-  std::vector<EvaluationResult> results;
-  for (const std::string& opponent : opponents) {
-    const EvaluationOptions options{
-        .opponent = opponent, .episodes = flags.episodes, .seed = flags.seed, .mode = mode};
-    absl::StatusOr<EvaluationResult> result = Evaluate(*policy, options, &interrupt.flag());
-    if (absl::IsCancelled(result.status())) return kInterruptedExit;
-    RETURN_IF_ERROR(result.status());
-    results.push_back(*std::move(result));
-  }
+  const absl::StatusOr<std::vector<EvaluationResult>> results = EvaluateAgainst(
+      *policy, opponents, {.opponent = "", .episodes = flags.episodes, .seed = flags.seed, .mode = mode},
+      &interrupt.flag());
+  if (absl::IsCancelled(results.status())) return kInterruptedExit;
+  RETURN_IF_ERROR(results.status());
   if (flags.json) {
-    std::printf("%s\n", ToJson(results[0]).dump().c_str());
+    std::printf("%s\n", ToJson(results->front()).dump().c_str());
     return 0;
   }
   const PolicySnapshot& snapshot = policy->snapshot();
   std::printf("%s: %s on %s, policy %s after %s updates; seed %s, acting mode %s\n%s", flags.policy.c_str(),
               snapshot.spec.algorithm.c_str(), snapshot.spec.env.c_str(),
               WithCommas(snapshot.version).c_str(), WithCommas(snapshot.updates).c_str(),
-              absl::StrCat(flags.seed).c_str(), flags.mode.c_str(), ResultTable(results).c_str());
+              absl::StrCat(flags.seed).c_str(), flags.mode.c_str(), ResultTable(*results).c_str());
   return 0;
 }
 

@@ -9,18 +9,18 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "actor/evaluation_loop.h"
+#include "actor/evaluator.h"
 #include "core/file_io.h"
-#include "core/safetensors.h"
 #include "core/status_macros.h"
 #include "deploy/launch/commit.h"
 #include "deploy/launch/health.h"
 #include "deploy/launch/result_tables.h"
 #include "deploy/launch/results.h"
+#include "deploy/launch/run_access.h"
 #include "deploy/launch/summary_reader.h"
 #include "deploy/process/interrupt.h"
 #include "deploy/terminal/terminal.h"
 #include "envs/registry/registry.h"
-#include "nn/policy.h"
 
 namespace dbr {
 namespace {
@@ -242,27 +242,24 @@ absl::Status Launch::FinalEvaluation(bool* interrupted) {
     Say("no final table: the learner had no policy to save yet");
     return absl::OkStatus();
   }
-  ASSIGN_OR_RETURN(PolicySnapshot snapshot, LoadPolicy(plan_.folder.latest_policy()));
-  const std::uint64_t version = snapshot.version;
-  ASSIGN_OR_RETURN(const auto policy, PolicyNetworks::Create(std::move(snapshot)));
+  ASSIGN_OR_RETURN(const auto policy, OpenPolicy(plan_.folder.latest_policy()));
   const EvaluationConfig& config = plan_.config.evaluation();
   const std::vector<std::string> opponents =
       OpponentsToEvaluate(summary().env, {config.final_opponents().begin(), config.final_opponents().end()});
-  Say(absl::StrCat("\nfinal evaluation of policy ", version, " (", plan_.folder.latest_policy(), "):"));
+  Say(absl::StrCat("\nfinal evaluation of policy ", policy->snapshot().version, " (",
+                   plan_.folder.latest_policy(), "):"));
   const Interrupt interrupt;
-  for (const std::string& opponent : opponents) {
-    const EvaluationOptions options{.opponent = opponent,
-                                    .episodes = static_cast<int>(config.final_episodes()),
-                                    .seed = plan_.config.seed(),
-                                    .mode = config.mode()};
-    absl::StatusOr<EvaluationResult> result = Evaluate(*policy, options, &interrupt.flag());
-    if (absl::IsCancelled(result.status())) {
-      *interrupted = true;
-      return absl::OkStatus();
-    }
-    RETURN_IF_ERROR(result.status());
-    watch_.AddFinalResult(*std::move(result));
-  }
+  absl::StatusOr<std::vector<EvaluationResult>> results =
+      EvaluateAgainst(*policy, opponents,
+                      {.opponent = "",
+                       .episodes = static_cast<int>(config.final_episodes()),
+                       .seed = plan_.config.seed(),
+                       .mode = config.mode()},
+                      &interrupt.flag());
+  *interrupted = absl::IsCancelled(results.status());
+  if (*interrupted) return absl::OkStatus();
+  RETURN_IF_ERROR(results.status());
+  watch_.SetFinalResults(*std::move(results));
   SaveSummary();
   std::string table = ResultTable(summary().final_results);
   if (const std::string returns = ReturnsTable(summary()); !returns.empty())

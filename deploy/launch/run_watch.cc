@@ -2,7 +2,6 @@
 
 #include <string>
 #include <utility>
-#include <vector>
 
 namespace dbr {
 namespace {
@@ -60,8 +59,8 @@ void RunWatch::Fail(const absl::Status& why) {
   summary_.failure = std::string(why.message());
 }
 
-void RunWatch::AddFinalResult(EvaluationResult result) {
-  summary_.final_results.push_back(std::move(result));
+void RunWatch::SetFinalResults(std::vector<EvaluationResult> results) {
+  summary_.final_results = std::move(results);
 }
 
 }  // namespace dbr

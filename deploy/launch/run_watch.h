@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/time/time.h"
@@ -43,7 +44,7 @@ class RunWatch {
 
   void Interrupt() { summary_.ended = RunEnding::kInterrupted; }
   void Fail(const absl::Status& why);
-  void AddFinalResult(EvaluationResult result);
+  void SetFinalResults(std::vector<EvaluationResult> results);
 
  private:
   const RunLimits limits_;

@@ -101,6 +101,19 @@ TEST(EvaluatorTest, AnUnknownErrorIsNotANumber) {
   EXPECT_TRUE(std::isnan(EstimateMean({}).mean));
 }
 
+TEST(EvaluatorTest, SeveralOpponentsAreMetInTurn) {
+  const auto policy = UntrainedPolicy(Connect4Spec(), 1);
+  const EvaluationOptions options{.opponent = "", .episodes = 5, .seed = 2};
+  const auto results = EvaluateAgainst(*policy, {"one_ply", "random"}, options);
+  ASSERT_TRUE(results.ok()) << results.status();
+  ASSERT_EQ(results->size(), 2);
+  EXPECT_EQ((*results)[0].opponent, "one_ply");
+  const auto random = Evaluate(*policy, {.opponent = "random", .episodes = 5, .seed = 2});
+  EXPECT_EQ((*results)[1].score_mean, random->score_mean);
+  EXPECT_THAT(std::string(EvaluateAgainst(*policy, {"random", "nobody"}, options).status().message()),
+              HasSubstr("nobody"));
+}
+
 TEST(EvaluatorTest, StopsWhenCancelled) {
   const std::atomic<bool> cancelled = true;
   const auto result = Evaluate(*UntrainedPolicy(Connect4Spec(), 1), {.opponent = "random"}, &cancelled);
