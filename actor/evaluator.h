@@ -42,14 +42,16 @@ struct EvaluationResult {
   double length_mean = 0;  // steps of the agent in an episode
 };
 
-// Plays exactly `episodes` episodes; episode k has the environment seed `seed * kMaxEpisodes + k`, so that a
-// two-player game starts with each side in turn, the agent first. Episodes run in groups of
+// Plays exactly options.episodes episodes. Episode k has the environment seed `seed * kMaxEpisodes + k`, so
+// that in a two-player game the sides start in turn, the agent first. Episodes run in groups of
 // kEvaluationColumns with one random stream a group: the result depends on the policy, the seed and the mode
 // alone, to the last bit on one kind of processor, and the first n episodes of a longer evaluation are those
-// of a shorter one. Blocks until all are played, or ends with Cancelled soon
-// after `cancelled` (may be null) becomes true. Other errors: InvalidArgument for an unknown environment or
-// opponent, a policy that does not fit it, a mode whose networks the policy lacks, or a number of episodes
-// outside [1, kMaxEpisodes]; Internal for a policy that gives values not finite.
+// of a shorter one.
+//
+// Blocks until all are played, or ends with Cancelled soon after `cancelled` (may be null) becomes true.
+// Other errors: InvalidArgument for an unknown environment or opponent, a policy that does not fit the
+// environment, a mode whose networks the policy lacks, or a number of episodes outside [1, kMaxEpisodes];
+// Internal for a policy that gives values that are not finite.
 absl::StatusOr<EvaluationResult> Evaluate(const PolicyNetworks& policy, const EvaluationOptions& options,
                                           const std::atomic<bool>* cancelled = nullptr);
 

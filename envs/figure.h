@@ -29,7 +29,7 @@ struct Figure {
   View view = View::kSide;
   std::vector<Limb> limbs;
   std::vector<Point> joints;
-  Point place;           // of the trunk
+  Point place;           // where the trunk is
   double speed_m_s = 0;  // forward
   double seconds_a_step = 0;
 };

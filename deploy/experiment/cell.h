@@ -26,29 +26,30 @@ enum class CellState {
 
 struct CellStanding {
   CellState state = CellState::kNew;
-  RunSummary summary;      // of the run; zeros where there is none
+  RunSummary summary;      // what the run came to; zeros where there is none
   std::string difference;  // kChanged: an indented line for each field
 };
 
-// Reads the cell's folder and compares its config with the cell's (deploy/launch/same_run.h).
+// Reads the cell's folder, each of its files once, and compares its config with the cell's
+// (DifferencesOfOutcome).
 CellStanding ReadStanding(const Cell& cell);
 
 // "to start", "to continue", "failed, to continue", "done", "of another config", "in use elsewhere".
 std::string StateText(CellState state);
 
-// Of a run that has its final results: "return 812.3 ± 20.1" with the standard deviation of an episode, or a
-// score for each opponent, "random 0.99, mcts:100 0.62".
+// The final results of a run in few words: "return 812.3 ± 20.1" with the standard deviation over episodes,
+// or a score for each opponent, "random 0.99, mcts:100 0.62"; empty where there are none.
 std::string ResultText(const RunSummary& summary);
 
-// Makes the folder that the cell's folder, log and config file lie in, and writes the config file.
+// Makes the folder in which the cell's folder, log and config file lie, and writes the config file.
 absl::Status PrepareCell(const Cell& cell);
 
-// Moves whatever stands in the place of the cell's folder, with its log, to
-// RUN_DIR/aside/TASK/CONTENDER/seed-N.K with the first K from 1 on that is free, and gives that path; empty
-// where there was nothing. Nothing is deleted.
+// Moves what stands in the place of the cell's folder, with its log, to
+// RUN_DIR/aside/TASK/CONTENDER/seed-N.K, where K is the first number from 1 on that is free. Returns that
+// path; empty where there was nothing. Nothing is deleted.
 absl::StatusOr<std::string> MoveAside(const Cell& cell, const std::string& run_dir);
 
-// Removes what only continuing the run would need: the store and the checkpoints. Policies, results, metrics
+// Removes the store and the checkpoints, which only continuing the run would need. Policies, results, metrics
 // and logs stay.
 absl::Status RemoveStores(const Cell& cell);
 

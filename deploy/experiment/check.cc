@@ -55,7 +55,7 @@ void CheckNames(const char* what, const std::vector<std::string>& names, std::ve
   }
 }
 
-// Of a field of a contender that must match one of `tasks`.
+// Checks a glob of a contender's `field`, which must match one of `tasks`.
 void CheckGlob(const std::string& contender, const char* field, const std::string& glob,
                const std::vector<std::string>& tasks, std::vector<std::string>* errors) {
   const auto matches = [&glob](const std::string& task) { return MatchesGlob(glob, task); };
@@ -159,7 +159,7 @@ const Task& TaskOf(const Experiment& experiment, const Cell& cell) {
                        [&cell](const Task& task) { return task.name() == cell.task; });
 }
 
-// Of the longer of its sockets.
+// Whether the path of the longer of the cell's two sockets is short enough.
 bool SocketFits(const Cell& cell) {
   const std::string address = RunFolder{cell.folder}.learner_address();
   return absl::StripPrefix(address, "unix:").size() < sizeof(sockaddr_un::sun_path);

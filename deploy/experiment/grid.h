@@ -28,7 +28,7 @@ struct Cell {
   std::string contender;
   Task::Kind kind = Task::OFFLINE;
   std::uint32_t seed = 1;
-  Config config;       // of the run, merged; the path of its seed buffer is absolute
+  Config config;       // as the run has it, merged; the path of its seed buffer is absolute
   std::string folder;  // RUN_DIR/TASK/CONTENDER/seed-N
 
   std::string name() const;         // TASK/CONTENDER/seed-N

@@ -25,20 +25,22 @@ namespace dbr {
 struct ExperimentOptions {
   std::string programs;  // the folder of `dbr`
   Capacity capacity;
-  bool keep_stores = false;  // else what only continuing a run would need is removed when it is done
-  bool overwrite_changed =
-      false;  // move runs of another config aside and start anew; else they are left alone
+  // False: what only continuing a run would need is removed when the run is done.
+  bool keep_stores = false;
+  // True: runs of another config are moved aside and started anew; false: they are left alone.
+  bool overwrite_changed = false;
 };
 
-// Runs the cells of one grid once, from the main thread. What the user sees goes to `out`.
+// Runs the cells of one grid once, from the main thread. What the user sees goes to `out`, which must outlive
+// it.
 class ExperimentRun {
  public:
   ExperimentRun(Grid grid, ExperimentOptions options, std::FILE* out);
 
   // Starts `dbr launch` for each cell that is not done, as many at once as the capacity has room for, until
-  // all are over or a signal came, upon which the running ones are told to save and stop. Blocks; gives the
-  // exit status: 0, 1 where a cell failed or was left alone, or 130 after a signal. An error where nothing
-  // could be run at all.
+  // all are over or a signal comes, upon which the running ones are told to save and stop. Blocks. Returns
+  // the exit status: 0, 1 where a cell failed or was left alone, or 130 after a signal. Returns an error
+  // where nothing could be run at all.
   absl::StatusOr<int> Run();
 
  private:
@@ -46,8 +48,8 @@ class ExperimentRun {
   struct Entry {
     Cell cell;
     Outcome outcome = Outcome::kWaiting;
-    RunSummary before;                             // of the run's earlier launches
-    RunSummary newest;                             // of the launch under way, as far as it has written one
+    RunSummary before;                             // what earlier launches of the run came to
+    RunSummary newest;                             // what the launch under way has written
     std::filesystem::file_time_type read_at = {};  // the age of the file that `newest` was read from
     absl::Time started = absl::InfiniteFuture();
   };
@@ -74,7 +76,7 @@ class ExperimentRun {
   StatusScreen screen_;
   std::vector<Entry> entries_;
   std::map<std::string, std::size_t> running_;  // entries by the cell's name
-  std::unique_ptr<Schedule> schedule_;          // of all entries
+  std::unique_ptr<Schedule> schedule_;          // over all entries
   CellDurations durations_;
   std::unique_ptr<Supervisor> supervisor_;
 };

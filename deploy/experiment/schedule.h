@@ -24,20 +24,20 @@ struct CellDemand {
   int cost = 1;
 };
 
-// Cores that a run of `config` keeps busy: one for each actor process, and one for the learner with its
+// How many cores a run of `config` keeps busy: one for each actor process, and one for the learner with its
 // replay.
 int CellCost(const Config& config);
 
-// Hands out cells by their place in `demands`, which come in the order of their seeds: none is handed out
-// before every one of the seeds before has been. Where the next in line does not fit beside those that run,
-// one behind it of the same seed may. A copy goes its own way. One thread.
+// Hands out cells by their index in `demands`, which must come in the order of their seeds: no cell is handed
+// out before every cell of the seeds before it has been. Where the next cell does not fit beside those that
+// run, a later one of the same seed may go first. Copies are independent. One thread.
 class Schedule {
  public:
   Schedule(std::vector<CellDemand> demands, Capacity capacity);
 
-  // The next that may start now, which then runs; empty where none may.
+  // The next cell that may start now, which then counts as running; empty where none may.
   std::optional<std::size_t> Next();
-  // That a running one is over.
+  // Says that a running cell is over.
   void Finish(std::size_t cell);
 
   std::size_t waiting() const { return waiting_.size(); }
@@ -53,8 +53,8 @@ class Schedule {
   int cores_taken_ = 0;
 };
 
-// How long `schedule` takes from now on, where its running cells, those with an entry in `left`, take that
-// long, and a waiting one durations[cell]. O(n log n) for n cells of one cost.
+// How long `schedule` takes from now on, where each running cell takes the time that is left in `running`,
+// and a waiting cell takes durations[cell]. O(n log n) for n cells of one cost.
 struct RunningCell {
   std::size_t cell = 0;
   absl::Duration left;

@@ -21,7 +21,7 @@ struct StatusRow {
 struct GridStatus {
   std::vector<StatusRow> running;
   int all = 0, done = 0, waiting = 0, failed = 0;
-  int left_alone = 0;                  // of another config, or in use by another launch
+  int left_alone = 0;                  // they hold a run of another config, or another launch uses them
   std::optional<absl::Duration> left;  // until all are done; empty: not known yet
 };
 

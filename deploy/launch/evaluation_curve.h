@@ -23,18 +23,18 @@ struct EvaluationPoint {
   double score_mean = std::numeric_limits<double>::quiet_NaN();  // NaN: the environment has no score
   double score_stderr = std::numeric_limits<double>::quiet_NaN();
   double return_mean = 0;
-  double return_std = 0;                                  // of single episodes; NaN for one alone
-  std::optional<std::uint64_t> iteration = std::nullopt;  // of a run that is evaluated by updates
+  double return_std = 0;                                  // over single episodes; NaN for one alone
+  std::optional<std::uint64_t> iteration = std::nullopt;  // only in a run that is evaluated by updates
 };
 
-// One thread.
+// Collects evaluations from the answers of the services, each once. A copyable value. One thread.
 class EvaluationCurve {
  public:
   EvaluationCurve() = default;
   explicit EvaluationCurve(std::vector<EvaluationPoint> earlier, std::set<std::uint64_t> skipped = {})
       : points_(std::move(earlier)), skipped_(std::move(skipped)) {}
 
-  // Takes the evaluations that it has not seen, and gives them.
+  // Takes the evaluations that it does not know yet, and returns them.
   std::vector<EvaluationPoint> Update(const RunSample& sample);
 
   const std::vector<EvaluationPoint>& points() const { return points_; }
@@ -43,11 +43,12 @@ class EvaluationCurve {
   // The latest iteration that was evaluated; empty where none was, and in a run that is evaluated by time.
   std::optional<std::uint64_t> LastIteration() const;
 
-  // How good the policy was when an offline phase of that many updates ended: the last evaluation of a policy
-  // that no actor had followed yet, unless that was made before the last tenth of the phase and there is one
-  // soon after.
+  // The evaluation of the policy that an offline phase of that many updates ended with: the last one made
+  // before any actor had acted, unless it was made before the last tenth of the phase and there is one soon
+  // after. Empty where there is neither.
   std::optional<EvaluationPoint> AfterOffline(std::uint64_t offline_updates) const;
-  // The lowest mean return of those made after the first transition of an actor.
+  // The evaluation with the lowest mean return of those made after the first transition of an actor; empty
+  // where there is none.
   std::optional<EvaluationPoint> LowestOnline() const;
 
  private:
@@ -58,7 +59,8 @@ class EvaluationCurve {
   static constexpr std::size_t kMoments = 4096;  // more than half an hour of two questions a second
 
   void Remember(const RunSample& sample);
-  // Between the two moments that it lies between.
+  // The actors' transitions when that many updates were made, on a straight line between the two moments
+  // around it.
   std::uint64_t StepsAt(std::uint64_t updates) const;
   bool Knows(const EvaluationReport& report) const;
 

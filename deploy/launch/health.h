@@ -15,8 +15,8 @@
 
 namespace dbr {
 
-// One question "are you serving?", asked from a thread of its own until the server answers or the timeout is
-// over.
+// Asks one server "are you serving?" in a thread of its own, until it answers or the timeout is over. All
+// methods are thread-safe.
 class HealthCheck {
  public:
   // `on_answer` is called once, from that thread, when result() has a value; it must not block.

@@ -21,15 +21,16 @@
 
 namespace dbr {
 
-// Runs one plan once, from the main thread. Everything that the user sees goes to `out`.
+// Runs one plan once, from the main thread. Everything that the user sees goes to `out`, which must outlive
+// it. What it knows of the run is its RunWatch's; it starts and stops the processes, and tells.
 class Launch {
  public:
   // `programs`: the folder of dbr-replay, dbr-learner and dbr-actor. Internal where the log cannot be opened.
   static absl::StatusOr<std::unique_ptr<Launch>> Create(RunPlan plan, std::string programs, std::FILE* out);
 
   // Starts everything (the actors after the offline phase), trains until a limit of the config or a signal,
-  // stops everything with its state saved, and evaluates the last policy. Blocks; gives the exit status (0,
-  // or 130 after a signal), or the first failure.
+  // stops everything with its state saved, and evaluates the last policy. Blocks. Returns the exit status, 0
+  // or after a signal 130, or the first failure.
   absl::StatusOr<int> Run();
 
  private:

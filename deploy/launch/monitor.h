@@ -16,7 +16,7 @@
 
 namespace dbr {
 
-// The newest answers; they stay while a service is away.
+// The newest answers of both services; they stay while a service is away.
 struct RunSample {
   std::optional<StatsReply> replay;
   std::optional<LearnerStatus> learner;

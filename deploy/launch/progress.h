@@ -12,11 +12,11 @@
 
 namespace dbr {
 
-// What the line tells.
+// What the line shows.
 struct Progress {
   RunSample sample;
   std::optional<absl::Duration> left;  // empty: no limit, or not known yet
-  EnvPresentation presentation;        // of the environment
+  EnvPresentation presentation;        // how the environment is shown
   std::uint64_t offline_updates = 0;   // while the phase lasts: how many it has
 };
 
@@ -27,7 +27,8 @@ struct Progress {
 // is room, abbreviations where there is not.
 std::string ProgressText(const Progress& progress, int width);
 
-// Writes it: in place on a terminal, else as a line now and then. One thread.
+// Keeps the line in place on a terminal; where the output is none, writes it now and then. One thread. The
+// stream must outlive it.
 class ProgressLine {
  public:
   // `every`: how often at most a line is written where `out` is no terminal.

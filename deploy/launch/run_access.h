@@ -9,11 +9,12 @@
 
 namespace dbr {
 
-// The policy in a file, or the newest one of a run folder. NotFound, DataLoss or InvalidArgument, naming the
-// file.
+// Reads the policy in a file, or the newest one of a run folder. NotFound, DataLoss or InvalidArgument,
+// naming the file.
 absl::StatusOr<std::shared_ptr<const PolicyNetworks>> OpenPolicy(const std::string& file_or_run);
 
-// The replay server's address: given itself, or by a run folder or a socket's path.
+// The address of a replay server that is given by itself, by a run folder or by a socket's path.
+// InvalidArgument for anything else, and errors of reading the run's config.
 absl::StatusOr<std::string> ReplayAddress(const std::string& address_or_run);
 
 }  // namespace dbr

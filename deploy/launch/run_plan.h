@@ -25,7 +25,8 @@ struct LaunchOptions {
   bool resume = false;
 };
 
-// Who uses a run folder; freed with the object, or by the kernel when the process dies.
+// The right to use a run folder. It is given back when the object is destroyed, or by the kernel when the
+// process dies.
 class RunFolderLock {
  public:
   // FailedPrecondition where another launch uses the folder.
@@ -49,37 +50,39 @@ struct RunPlan {
   std::unique_ptr<RunFolderLock> lock;
 };
 
-// Loads and checks the config, makes the folder or checks that it can be continued, and writes the effective
-// config. A folder whose run never came to have anything to go on with is begun anew by `resume`. Errors:
-// InvalidArgument for a bad config or seed, what does not fit the environment (CheckFits), or a config that
-// differs from the folder's where that would not continue the same run (each field is named); AlreadyExists
-// where the folder is there and `resume` was not said; NotFound where there is nothing to resume;
-// FailedPrecondition where another launch uses the folder.
+// Loads and checks the config, makes the folder or checks that the run in it can be continued, and writes the
+// effective config. With `resume`, a folder whose run has nothing to go on with yet is begun anew. Errors:
+// InvalidArgument for a bad config or seed buffer, for what does not fit the environment (CheckFits), and for
+// a config that differs from the folder's where that would not continue the same run (each field is named);
+// AlreadyExists where the folder is there and `resume` was not said; NotFound where there is nothing to
+// resume; FailedPrecondition where another launch uses the folder.
 absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now);
 
-// In which order processes are stopped: each saves its state while what it needs is still there.
+// Processes are stopped in this order: each saves its state while what it needs is still there.
 enum StopRank { kStopActors, kStopLearner, kStopReplay };
 
-// Replay, learner and evaluator, in the order in which they start. `programs`: the folder of the programs.
+// The processes of replay, learner and evaluator, in the order in which they start. `programs` is the folder
+// of the programs.
 std::vector<ProcessSpec> Services(const RunPlan& plan, const std::string& programs);
-// The actors, who start after the offline phase.
+// The processes of the actors, which start after the offline phase.
 std::vector<ProcessSpec> Actors(const RunPlan& plan, const std::string& programs);
 
 // The environment that a config names. InvalidArgument where there is none.
 absl::StatusOr<EnvSpec> EnvSpecOf(const Config& config);
 
-// InvalidArgument where the algorithm does not serve the actions of `env`, how actors or the evaluator are to
-// choose is not for them, or an evaluation has too many episodes or an opponent that `env` does not have.
+// InvalidArgument where the algorithm does not serve the actions of `env`, the way in which actors or the
+// evaluator choose actions is not for them, or an evaluation has too many episodes or an opponent that `env`
+// does not have.
 absl::Status CheckFits(const Config& config, const EnvSpec& env);
 
-// How many a launch of `config` starts on this machine; 0: all training is offline.
+// How many actor processes a launch of `config` starts on this machine; 0: all training is offline.
 int ActorProcesses(const Config& config);
 
-// Actor processes for a machine of `cores`: half of them, for the learner, the replay and the evaluator want
-// the others.
+// How many actor processes a machine of `cores` gets by default: half of its cores, for the learner, the
+// replay and the evaluator want the others.
 int DefaultActors(int cores);
 
-// "dbr", also where the config leaves the algorithm out.
+// The name of the algorithm's field in the config; "dbr" also where the config leaves the algorithm out.
 std::string AlgorithmName(const Config& config);
 
 }  // namespace dbr

@@ -20,7 +20,7 @@ struct SeedBufferSummary {
   std::uint64_t rows = 0;      // transitions that were loaded
   std::uint64_t bad_rows = 0;  // rows with values that are not finite, which were left out
   std::uint64_t episodes = 0;  // whole ones
-  double return_mean = 0, return_std = 0, return_min = 0, return_max = 0;  // of the whole episodes
+  double return_mean = 0, return_std = 0, return_min = 0, return_max = 0;  // over the whole episodes
   double rows_per_second = 0;
 };
 
@@ -30,27 +30,28 @@ struct RunSummary {
   std::string algorithm;
   std::uint64_t seed = 0;
   std::string config;  // the file that the run was launched with
-  std::string commit;  // of the newest launch's programs (deploy/launch/commit.h)
+  std::string commit;  // that the newest launch's programs were built from (deploy/launch/commit.h)
   RunEnding ended = RunEnding::kNone;
-  std::string failure;    // of a failed one
+  std::string failure;    // why a failed one failed
   double wall_s = 0;      // from the start of the processes to their end, over all launches of the run
-  double training_s = 0;  // of that, with everything up
+  double training_s = 0;  // the part of it with everything up
   std::uint64_t launches = 0;
   std::uint64_t games = 0;        // episodes that ended
-  std::uint64_t transitions = 0;  // of the actors
+  std::uint64_t transitions = 0;  // that the actors made
   std::uint64_t updates = 0;
   std::uint64_t policy_version = 0;
-  std::uint64_t restarts = 0;  // of processes that died
+  std::uint64_t restarts = 0;  // after a process died
   SeedBufferSummary seed_buffer;
-  std::uint64_t offline_updates = 0;  // that the config asks for
+  std::uint64_t offline_updates = 0;  // as the config asks
   EvaluationCurve curve;              // during training
-  std::uint64_t every_updates = 0;    // of evaluations, that the config asks for; 0: by time
+  std::uint64_t every_updates = 0;    // between evaluations, as the config asks; 0: by time
   std::vector<EvaluationResult> final_results;
 
-  // Takes over the counters of the newest answers, and gives the evaluations that are new.
+  // Takes over the counters of the newest answers, and returns the evaluations that are new.
   std::vector<EvaluationPoint> Update(const RunSample& sample);
-  // The iterations that no evaluation was made of: those that the evaluator skipped, and once training has
-  // ended those that it had not come to, but for the last one, whose policy the final evaluation is of.
+  // The iterations without an evaluation: those that the evaluator skipped, and, once training has ended,
+  // those that it had not come to. The last iteration does not count, for the final evaluation is of its
+  // policy.
   std::set<std::uint64_t> SkippedIterations() const;
   // See EvaluationCurve; empty without an offline phase.
   std::optional<EvaluationPoint> AfterOffline() const;

@@ -21,12 +21,12 @@ struct ProbedPosition {
   std::vector<float> pi;
   std::vector<float> beta_plus;
   std::vector<float> beta_minus;
-  std::vector<float> beta;  // of an algorithm with one behaviour policy
+  std::vector<float> beta;  // for an algorithm with one behaviour policy
   std::vector<float> q;
 };
 
 // Asks the policy about all boards in one pass. InvalidArgument for a policy of another environment, a
-// finished game, or a mode whose networks the policy lacks. `seed` is that of the mode SAMPLE.
+// finished game, or a mode whose networks the policy lacks. `seed` is the random seed of the mode SAMPLE.
 absl::StatusOr<std::vector<ProbedPosition>> Probe(const PolicyNetworks& policy,
                                                   absl::Span<const connect4::Board> boards, ActingMode mode,
                                                   std::uint64_t seed);
@@ -34,15 +34,15 @@ absl::StatusOr<std::vector<ProbedPosition>> Probe(const PolicyNetworks& policy,
 // Shares in [0, 1]; empty where there is no position of the kind.
 struct ProbeShares {
   std::size_t positions = 0;
-  std::optional<double> must_block;            // answered, of the must_block positions
-  std::optional<double> must_win;              // answered, of the must_win positions
-  std::optional<double> keeps_value_decisive;  // of the positions where a move can change the outcome
-  std::optional<double> best;                  // of all positions
+  std::optional<double> must_block;            // the share that is answered
+  std::optional<double> must_win;              // the share that is answered
+  std::optional<double> keeps_value_decisive;  // where a move can change the outcome
+  std::optional<double> best;                  // among all positions
 };
 
 bool Contains(const std::vector<int>& columns, int column);
 
-// `probed[i]` is the policy's answer to `positions[i]`.
+// How many of the moves are right. `probed[i]` must be the policy's answer to `positions[i]`.
 ProbeShares ScoreMoves(absl::Span<const ReferencePosition> positions,
                        absl::Span<const ProbedPosition> probed);
 

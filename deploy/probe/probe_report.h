@@ -10,13 +10,14 @@
 
 namespace dbr {
 
-// The board, and pi, beta+, beta- and Q of each column as bars; beta in place of beta+ and beta- where the
-// policy has one behaviour. `moves` led to the position.
+// A drawing of the board, and of pi, beta+, beta- and Q of each column as bars; of beta in place of beta+ and
+// beta- where the policy has one behaviour policy. `moves` led to the position.
 std::string PositionText(absl::string_view moves, const ProbedPosition& probed);
 
-// The same in one line, a small column for each move, with the judgement of the move played.
+// The same in one line, with a small bar for each column and the judgement of the move played.
 std::string PositionLine(const ReferencePosition& position, const ProbedPosition& probed);
 
+// The shares with bars, a line each.
 std::string SharesText(const ProbeShares& shares);
 
 // {moves, to_move, move, pi, beta_plus, beta_minus, beta, q}: seven entries each, null for a full column, or

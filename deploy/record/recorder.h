@@ -21,19 +21,21 @@ struct RecordOptions {
   int threads = 0;  // 0: one for each core
 };
 
-// What recording hears of itself. Both are called by the thread that called Record.
+// Where recorded episodes go. Both are called by the thread that called RecordEpisodes.
 struct RecordSinks {
   std::function<absl::Status(const EpisodeView&)> episode;
   std::function<void(std::int64_t)> progress;  // steps played so far; several times a second
 };
 
 // Plays episodes 0, 1, 2, ... and hands them to `sinks.episode` in this order, options.steps steps in all:
-// the last episode is given only as far as they reach, and is then unfinished. Each episode has seeds of its
-// own, and episodes run in groups of a size that depends on options.steps alone, so that what comes out
-// depends on env, policy, steps and seed, not on the number of threads. An episode whose world failed ends as
-// cut before the step that failed. Blocks; Cancelled soon after `cancelled` becomes true. Other errors:
-// InvalidArgument for an unknown environment, one with discrete actions, or a policy that does not fit it;
-// Internal for a policy that gives values not finite; those of `sinks.episode`.
+// the last episode is cut where they end, and is then unfinished. Each episode has random seeds of its own,
+// and episodes run in groups of a size that depends on options.steps alone, so that what comes out depends on
+// env, policy, steps and seed, and not on the number of threads. An episode whose world failed ends as cut
+// before the step that failed.
+//
+// Blocks; Cancelled soon after `cancelled` becomes true. Other errors: InvalidArgument for an unknown
+// environment, one with discrete actions, or a policy that does not fit it (CheckPolicyFits); Internal for a
+// policy that gives values that are not finite; errors of `sinks.episode`.
 absl::Status RecordEpisodes(const RecordOptions& options, const RecordSinks& sinks,
                             const std::atomic<bool>& cancelled);
 

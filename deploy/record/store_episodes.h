@@ -18,13 +18,14 @@ struct StoreEpisode {
   EpisodeEnding ending = EpisodeEnding::kUnfinished;
 };
 
-// Transitions of several environments lie in the store as they came. Those of one writer are linked where the
-// next observation of one is, bit for bit, the observation of a later one. An episode is over at discount 0
-// or after `max_episode_steps`; what was evicted before, or was under way when the run stopped, is
-// unfinished. In the order in which they began. Rows of a seed are left out.
+// Finds the episodes in a store, in the order in which they began. Transitions of several environments lie in
+// the store as they came: those of one writer are linked where the next observation of one is, bit for bit,
+// the observation of a later one. An episode is over at discount 0 or after `max_episode_steps`. An episode
+// is unfinished where its end was evicted or had not come when the run stopped. Rows of the seed buffer are
+// left out.
 std::vector<StoreEpisode> LinkEpisodes(const TransitionStore& store, int max_episode_steps);
 
-// Copies the first `steps` steps of an episode.
+// Copies the first `steps` steps of an episode. O(steps).
 EpisodeRows CopyEpisode(const TransitionStore& store, const StoreEpisode& episode, std::size_t steps);
 
 // A run's store, opened by the run's own config.
@@ -33,8 +34,8 @@ struct RunStore {
   std::unique_ptr<TransitionStore> store;
 };
 
-// NotFound where `run` is no run folder or has no store, FailedPrecondition while the run goes on, and other
-// errors of TransitionStore::Open.
+// Opens the store of the run in that folder. NotFound where it is no run folder or has no store,
+// FailedPrecondition while the run goes on, and other errors of TransitionStore::Open.
 absl::StatusOr<RunStore> OpenRunStore(const std::string& run);
 
 }  // namespace dbr

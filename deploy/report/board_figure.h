@@ -22,15 +22,15 @@ struct BoardAnswer {
     std::string label;
     std::vector<float> probabilities;
   };
-  std::vector<Distribution>
-      distributions;  // pi, and those of beta+, beta- and the behaviour policy that it has
+  // pi, and those of beta+, beta- and the behaviour policy that the policy has.
+  std::vector<Distribution> distributions;
 };
 
-// InvalidArgument for a policy of another environment.
+// Asks a policy. InvalidArgument for a policy of another environment.
 absl::StatusOr<BoardAnswer> AskAboutBoard(const PolicyNetworks& policy, const std::string& label);
 
-// Of the first finished run of each contender whose newest policy file is there. Contenders without one are
-// left out; files that cannot be read are named in `notes`.
+// The answer of the first finished run of each contender whose newest policy file is there. Contenders
+// without one are left out; files that cannot be read are named in `notes`.
 std::vector<BoardAnswer> BoardAnswers(const Runs& runs, std::vector<std::string>* notes);
 
 // The board on the left, a row of bars for each answer on its right.

@@ -27,13 +27,12 @@ struct ReportedCell {
   int task = 0;       // index in the grid
   int contender = 0;  // index in the grid
   std::uint64_t seed = 0;
-  std::string folder;  // RUN_DIR/TASK/CONTENDER/seed-N; empty for one that was not run
+  std::string folder;  // RUN_DIR/TASK/CONTENDER/seed-N; empty where it was not run
   ReportedState state = ReportedState::kNotRun;
-  std::string failure;   // of a failed one
+  std::string failure;   // why a failed one failed
   RunSummary summary;    // where one could be read
-  std::string settings;  // its config's fields that are not at their defaults, but for the seed, one a line
-  std::string
-      digest;  // CRC-32C of the effective config but for its seed, 8 hexadecimal digits; empty: unread
+  std::string settings;  // Settings::differences of its config
+  std::string digest;    // Settings::digest of its config; empty where the config could not be read
 };
 
 struct Runs {
@@ -44,11 +43,12 @@ struct Runs {
 };
 
 // Reads the experiments' folders (RUN_DIR/TASK/CONTENDER/seed-N/{summary.json, config.textproto}). The grid
-// is the file at `grid_path`, or where that is empty what RUN_DIR/experiment.textproto of each folder say,
-// earlier folders going before later ones; seeds are those of the scale in RUN_DIR/scale.txt (one
-// where it is not known) and all that have a folder. Of a cell in two folders the one that is done counts,
-// else the first. InvalidArgument for a folder that holds no experiment, and see LoadExperiment; what is
-// wrong within a cell is that cell's failure and a note.
+// is the file at `grid_path`, or where that is empty what RUN_DIR/experiment.textproto of each folder says,
+// earlier folders going before later ones. Each cell is expected with the seeds of the scale in
+// RUN_DIR/scale.txt (with one where the scale is not known), and with all others that have a folder. Where
+// two folders have the same cell, the one that is done counts, else the first. InvalidArgument for a folder
+// that holds no experiment; see LoadExperiment for others. What is wrong within a cell is that cell's failure
+// and a note.
 absl::StatusOr<Runs> LoadRuns(absl::Span<const std::string> folders, const std::string& grid_path);
 
 }  // namespace dbr::report

@@ -8,7 +8,7 @@
 
 namespace dbr::report {
 
-// x, and over the seeds the mean, the least and the greatest value there.
+// The mean, the least and the greatest value over the seeds, at each x.
 struct Curve {
   std::vector<double> x, mean, low, high;
   int seeds = 0;
@@ -17,10 +17,11 @@ struct Curve {
 // What a curve is drawn over.
 enum class Axis { kUpdates, kSteps };
 
-// Of the contender's finished runs on the task, against `opponent` (empty: the first that was evaluated):
-// scores where there are any, else mean returns. A curve is read off at kPoints places or at as many as the
-// longest run was evaluated at, whichever are fewer, spread evenly over the stretch that all seeds share,
-// between evaluations on a straight line. No points where there is nothing to draw.
+// The curve of the contender's finished runs on the task against `opponent` (empty: the first that was
+// evaluated): of scores where there are any, else of mean returns. It is read off at kPoints places, or at as
+// many as the longest run was evaluated at where they are fewer. The places are spread evenly over the
+// stretch that all seeds share, and between evaluations the curve is straight. It has no points where there
+// is nothing to draw.
 inline constexpr int kPoints = 120;
 Curve MakeCurve(const Runs& runs, int task, int contender, const std::string& opponent, Axis axis);
 

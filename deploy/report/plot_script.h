@@ -10,7 +10,7 @@
 
 namespace dbr::report {
 
-// Every plot of a report, for one call of gnuplot: it starts with this, and the plots follow.
+// How the script of all plots of a report begins, for one call of gnuplot; the plots follow.
 std::string ScriptHead();
 
 // A line with a band from least to greatest where it has two seeds or more. Contenders keep their style in
@@ -37,13 +37,13 @@ struct Estimate {
   double high = std::numeric_limits<double>::quiet_NaN();
 };
 
-// Beside each other: what was published, and ours.
+// Two bars side by side: what was published, and ours.
 struct Bar {
   std::string label;
   std::optional<Estimate> published, ours;
 };
 
-// With a scale of its own.
+// Bars on one scale.
 struct BarPanel {
   std::string title, y_label;
   std::vector<Bar> bars;

@@ -30,22 +30,24 @@ struct Sample {
 struct Row {
   int task = -1;  // index in the grid; -1: over several tasks
   Measure measure;
-  bool score = false;           // of games, in [0, 1]; else an episode's return
+  bool score = false;           // its values are scores of games, in [0, 1]; else returns of episodes
   std::vector<Sample> samples;  // one for each contender of the grid
 };
 
-// Of all tasks in the grid's order. The bootstrap's resamples depend on the row and the contender alone.
+// The rows of all tasks, in the grid's order. The bootstrap's resamples depend on the row and the contender
+// alone.
 std::vector<Row> MakeRows(const Runs& runs);
 
-// Over all tasks that are scored in [0, 1], where their rows are two or more: a run's value is the mean of
-// its scores, the strata of the bootstrap are the tasks. Contenders with no finished run in one of the tasks
-// have no figure. Returns of different tasks have no common scale: there is no such row of them.
+// The row over all tasks that are scored in [0, 1]; empty where they have fewer than two rows. A run's value
+// is the mean of its scores, and the strata of the bootstrap are the tasks. Contenders with no finished run
+// in one of the tasks have no figure. Returns of different tasks have no common scale: there is no such row
+// of them.
 std::optional<Row> OverAllScores(const Runs& runs, const std::vector<Row>& rows);
 
-// What the measure's final evaluation of a run came to; NaN where it has none.
+// The mean that the run's final evaluation gives for the measure; NaN where it has none.
 double FinalMean(const ReportedCell& cell, const Measure& measure);
 
-// The figure that was published of a contender, or null.
+// What was published of a contender, or null. The pointer lives as long as `measure`.
 const Published* PublishedOf(const Measure& measure, const std::string& contender);
 
 // "1149.2"; a score with three digits after the point, a return with one.

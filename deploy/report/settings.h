@@ -19,7 +19,7 @@ struct Settings {
 
 Settings SettingsOf(const Config& config);
 
-// Of a config file. See LoadConfig for the errors.
+// The settings of a config file. See LoadConfig for the errors.
 absl::StatusOr<Settings> LoadSettings(const std::string& path);
 
 }  // namespace dbr::report

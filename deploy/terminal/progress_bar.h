@@ -9,10 +9,10 @@
 
 namespace dbr {
 
-// What a bar tells.
+// What a progress bar shows.
 struct BarState {
   std::string label;
-  std::string unit;  // of what is counted: "steps"
+  std::string unit;  // what is counted: "steps"
   std::int64_t done = 0;
   std::int64_t total = 0;
   absl::Duration elapsed;
@@ -21,7 +21,8 @@ struct BarState {
 // "hopper random  ████▌      45%  450k of 1.0M steps · 18k steps/s · 0:30 left", at most `width` cells.
 std::string BarText(const BarState& state, int width);
 
-// Writes it: in place on a terminal, else as a line now and then. One thread.
+// Keeps the bar in place on a terminal; where the output is none, writes it as a line now and then. One
+// thread. The stream must outlive it.
 class ProgressBar {
  public:
   // `every`: how often at most a line is written where `out` is no terminal.

@@ -20,21 +20,23 @@ std::string Clock(absl::Duration duration);
 // `value` with `digits` after the point; an en dash for a NaN or an infinite one.
 std::string Fixed(double value, int digits);
 
-// `fraction` (clipped to [0, 1]; NaN draws nothing) of `width` cells, in eighths of a cell; padded with
-// spaces to `width`.
+// A bar of `width` cells, the share `fraction` of them filled (clipped to [0, 1]; NaN fills nothing), in
+// eighths of a cell; padded with spaces to `width`.
 std::string Bar(double fraction, int width);
 // One cell whose height says `fraction`; a space for 0.
 std::string Spark(double fraction);
 
-// Cells that the UTF-8 text takes, one for each code point.
+// How many cells the UTF-8 text takes, one for each code point.
 int DisplayWidth(absl::string_view text);
+// The text with spaces behind it, or before it, up to `width` cells.
 std::string PadRight(absl::string_view text, int width);
 std::string PadLeft(absl::string_view text, int width);
-// The first `width` cells.
+// The first `width` cells of the text.
 std::string Truncate(absl::string_view text, int width);
 
+// Whether the file descriptor is a terminal.
 bool IsTerminal(int fd);
-// Columns and rows of the terminal at `fd`; `otherwise` where it is none.
+// The columns and rows of the terminal at `fd`; `otherwise` where it is none.
 int TerminalWidth(int fd, int otherwise);
 int TerminalHeight(int fd, int otherwise);
 
