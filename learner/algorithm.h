@@ -1,5 +1,5 @@
-// The interface of a learning algorithm. Each has a file in algorithms/, is composed of what training/ and
-// objectives/ hold, and has no other base class.
+// The interface of a learning algorithm. Each algorithm is one class in algorithms/, built from the parts in
+// training/ and objectives/. It has no other base class.
 #pragma once
 
 #include <cstdint>
@@ -17,27 +17,28 @@
 
 namespace dbr {
 
-// How many transitions an update wants from D, D+ and D-.
+// The number of transitions that one update wants from D, D+ and D-.
 struct BatchNeeds {
   int uniform = 0;
   int plus = 0;
   int minus = 0;
 };
 
-// What an update is given. A part whose partition was empty has size 0.
+// The batches of one update. A part whose partition was empty has size 0.
 struct UpdateBatches {
   const Batch& uniform;
   const Batch& plus;
   const Batch& minus;
 };
 
-// A named quantity of the newest update, for people; the order of names never changes in an algorithm's life.
+// A named quantity of the newest update, for people to read. An algorithm never changes the order of its
+// names.
 struct UpdateMetric {
   const char* name;
   double value = 0;
 };
 
-// What an algorithm is made for.
+// What an algorithm is made from. `seed` is the random seed of its parameters and its noise.
 struct AlgorithmSpec {
   std::string env;
   int observation_size = 0;
@@ -48,36 +49,42 @@ struct AlgorithmSpec {
   std::uint64_t seed = 0;
 };
 
-// One thread at a time.
+// One learning algorithm with its networks and optimizers. The trainer owns it. One thread at a time may call
+// it; an update may use a second thread inside (AlgorithmConfig.threads).
 class Algorithm {
  public:
   virtual ~Algorithm() = default;
 
   virtual BatchNeeds needs() const = 0;
 
-  // One update. Allocates nothing once batch sizes have settled. Internal, naming the quantity, where a loss
-  // or a parameter is no longer finite: the state is then worthless and training must stop.
+  // Makes one update. It allocates nothing once the batch sizes have settled. Returns Internal, naming the
+  // quantity, where a loss or a parameter is no longer finite. The state is then worthless and training must
+  // stop.
   virtual absl::Status Update(const UpdateBatches& batches) = 0;
 
-  // Of the newest update: an advantage for each transition of its uniform batch, and metrics.
+  // The advantage of each transition in the newest update's uniform batch [n].
   virtual absl::Span<const float> advantages() const = 0;
+  // The metrics of the newest update.
   virtual absl::Span<const UpdateMetric> metrics() const = 0;
 
-  // Useful floating-point operations of one update with full batches: its matrix products, each counted once.
+  // The useful floating-point operations of one update with full batches: its matrix products, each counted
+  // once.
   virtual double UpdateFlops() const = 0;
 
-  // The networks that actors and evaluators need; version and updates are the caller's to fill.
+  // Writes the networks that actors and evaluators need. The caller fills in the version and the number of
+  // updates.
   virtual void ExportPolicy(PolicySnapshot* snapshot) const = 0;
 
-  // Everything that continuing bit for bit needs: parameters, targets, optimizer moments, multipliers,
-  // counters.
+  // Writes everything that a bit-for-bit continuation needs: parameters, targets, optimizer moments,
+  // multipliers, the random generator and counters.
   virtual void Save(TensorFile* file) const = 0;
-  // DataLoss or InvalidArgument, naming the tensor, where one is missing or of another size; the state is
-  // then unspecified.
+  // Reads what Save wrote. Returns DataLoss where a tensor or counter is missing and InvalidArgument where a
+  // tensor has another size, and names it. The state is then unspecified.
   virtual absl::Status Load(const TensorFile& file) = 0;
 };
 
-// Name of the algorithm that a config sets, as the member of its oneof ("dbr"); "" where it sets none.
+// The name of the algorithm that a config sets: the member of its oneof ("dbr"). It is "" where the config
+// sets none.
 std::string AlgorithmName(const AlgorithmConfig& config);
 
 }  // namespace dbr

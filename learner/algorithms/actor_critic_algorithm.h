@@ -1,5 +1,6 @@
-// What the learner asks of any actor-critic, answered from its networks. An algorithm derives from this, adds
-// Update and UpdateFlops, and hides what it has more to say on.
+// The methods of Algorithm that are the same for every actor-critic, answered from its networks. An algorithm
+// derives from this class and adds Update and UpdateFlops. Where its answer differs, it hides the method with
+// its own.
 #pragma once
 
 #include <utility>
@@ -9,7 +10,8 @@
 
 namespace dbr {
 
-// Networks: ActorCritic (learner/training/actor_critic.h) or what derives from it.
+// The base of an actor-critic algorithm. `Networks` is ActorCritic (learner/training/actor_critic.h) or
+// derives from it. One thread at a time.
 template <class Networks>
 class ActorCriticAlgorithm {
  public:
@@ -21,7 +23,8 @@ class ActorCriticAlgorithm {
   absl::Status Load(const TensorFile& file) { return networks_.Load(file); }
 
  protected:
-  // The names of the metrics, and what the networks are made from.
+  // `metrics` holds the names of the metrics in their order. `arguments` go to the constructor of the
+  // networks.
   template <class... Arguments>
   explicit ActorCriticAlgorithm(std::vector<UpdateMetric> metrics, const Arguments&... arguments)
       : networks_(arguments...), metrics_(std::move(metrics)) {}

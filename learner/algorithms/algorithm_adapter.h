@@ -1,11 +1,12 @@
-// An algorithm in single precision behind the interface. The algorithms are class templates, so that their
-// tests can run them in double.
+// Puts an algorithm in single precision behind the Algorithm interface. The algorithms are class templates,
+// so that their tests can run them in double precision.
 #pragma once
 
 #include "learner/algorithm.h"
 
 namespace dbr {
 
+// Owns the algorithm `Core<float>`. One thread at a time.
 template <template <class> class Core>
 class AlgorithmAdapter final : public Algorithm {
  public:

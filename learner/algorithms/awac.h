@@ -13,17 +13,19 @@
 
 namespace dbr {
 
-// State: policy pi, twin critics with targets. One update (algorithm 1) on a batch B drawn uniformly
-// from D:
-//   1. A = min_i Q_i(s, a) - mean_k min_i Q_i(s, a_k) of every transition, a_k value_samples draws of pi.
-//   2. y = r + discount * min_i Q'_i(s', a'), a' one draw of pi; each critic regresses on y.
-//   3. pi maximises E[w log pi(a|s)] over B, w = min(exp(A / temperature), max_weight) a constant.
+// State: a policy pi and twin critics with targets. One thread at a time. One update (algorithm 1) on a batch
+// B drawn uniformly from D:
+//   1. A = min_i Q_i(s, a) - mean_k min_i Q_i(s, a_k) for every transition, where the a_k are value_samples
+//      draws from pi.
+//   2. y = r + discount * min_i Q'_i(s', a'), where a' is one draw from pi. Each critic regresses on y.
+//   3. pi maximises E[w log pi(a|s)] over B. The weight w = min(exp(A / temperature), max_weight) is a
+//      constant.
 //   4. Polyak averaging of the critics.
-// Departures: A is taken before the critics' step, whose forward pass at (s, a) serves both, so that nothing
-// is computed twice and both sides of A are of the same critics. pi is a tanh-Gaussian, where theirs is a
-// Gaussian, and its log-std is clipped to the behaviour policies' [-5, 2] while it is trained: with the
+// Departures from the paper: A is taken before the critics' step. One forward pass at (s, a) then serves
+// both, and both sides of A come from the same critics. pi is a tanh-Gaussian, where theirs is a Gaussian.
+// While pi is trained, its log-std is clipped to [-5, 2], the limits of the behaviour policies: with the
 // policies' own lower limit of -20 the likelihood of data from a deterministic policy has no useful bound.
-// Actors clip at -20: at the bound pi may sample more narrowly than e^-5, never more broadly.
+// Actors clip at -20, so pi may sample more narrowly than e^-5 there, but never more broadly.
 template <class Scalar>
 class Awac : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
  public:
@@ -41,7 +43,7 @@ class Awac : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
   using Base::networks_;
 
   const AwacConfig& config() const { return networks_.spec.config.awac(); }
-  // V(s) [n] into value_, by draws from pi at s.
+  // Writes V(s) [n] into value_, estimated by draws from pi at s.
   void ComputeValue(const BasicBatch<Scalar>& batch);
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
 

@@ -1,5 +1,5 @@
-// What BEAR trains beside its behaviour model, whatever the actions: an actor-critic and its multiplier, and
-// the parts of an update that do not depend on the kind of action.
+// What BEAR trains beside its behaviour model, over either kind of action: an actor-critic and its
+// multiplier. The parts of an update that do not depend on the kind of action are here too.
 #pragma once
 
 #include <vector>
@@ -12,6 +12,7 @@
 
 namespace dbr {
 
+// BEAR's networks without the behaviour model. The algorithm owns them. One thread at a time.
 template <class Scalar>
 struct BearNetworks : ActorCritic<Scalar> {
   explicit BearNetworks(const AlgorithmSpec& spec)
@@ -21,7 +22,7 @@ struct BearNetworks : ActorCritic<Scalar> {
   // Whether the warm start is over.
   bool UseQ() const { return this->updates >= this->spec.config.bear().warm_start_updates(); }
 
-  // The multiplier's step, and the targets'.
+  // Ends an update: one step of the multiplier and of the targets.
   void Finish(const ConstrainedLoss<Scalar>& loss) {
     multiplier.Step(loss.divergence - loss.threshold);
     this->UpdateTargets();
@@ -35,13 +36,13 @@ struct BearNetworks : ActorCritic<Scalar> {
             {"train/advantage_positive"}, {"train/advantage_std"}};
   }
 
-  // Losses of one update's fits.
+  // The losses of the two fits of one update.
   struct FitLosses {
-    Scalar critic = 0;    // the twins' mean
-    Scalar behavior = 0;  // of the behaviour model
+    Scalar critic = 0;    // the mean of the twins' losses
+    Scalar behavior = 0;  // the behaviour model's loss
   };
 
-  // Sets `metrics`; Internal where one is not finite.
+  // Sets `metrics`. Returns Internal where a value is not finite.
   absl::Status Report(const FitLosses& fits, const ConstrainedLoss<Scalar>& loss, Scalar target_mean,
                       std::vector<UpdateMetric>* metrics) const {
     const AdvantageFigures figures = FiguresOf(this->advantages);

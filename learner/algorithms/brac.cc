@@ -80,7 +80,8 @@ double Brac<Scalar>::UpdateFlops() const {
   const Eigen::Index n = this->needs().uniform;
   const TwinCritic<Scalar>& critics = networks_.critics;
   const MlpShape& policy = networks_.policy.shape();
-  const int forward = config().variant() == BracConfig::VP ? 4 : 3;  // pi, beta at s, pi' (and beta) at s'
+  // pi and beta at s, and pi' at s'. VP evaluates beta at s' too.
+  const int forward = config().variant() == BracConfig::VP ? 4 : 3;
   return critics.TargetFlops(n) + critics.FitFlops(n) +
          critics.InputGradientFlops(n * config().divergence_samples()) + forward * policy.ForwardFlops(n) +
          2 * policy.ParameterGradientFlops(n);

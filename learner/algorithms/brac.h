@@ -14,21 +14,22 @@
 
 namespace dbr {
 
-// State: policy pi with target pi', twin critics with targets, a behaviour policy beta (tanh-Gaussian) and a
-// multiplier alpha. One update on a batch B drawn uniformly from D:
+// State: a policy pi with a target pi', twin critics with targets, a behaviour policy beta (tanh-Gaussian)
+// and a multiplier alpha. One thread at a time. One update on a batch B drawn uniformly from D:
 //   1. beta maximises the mean of log beta(a|s) over B.
-//   2. y = r + discount * V'(s'), V' = w min_i Q'_i + (1 - w) max_i Q'_i at one draw a' of pi'
-//      (their weighted mixture of an ensemble, w = target_min_weight); variant VP (their value penalty):
-//      less alpha * (log pi'(a'|s') - log beta(a'|s')). Each critic regresses on y.
-//   3. pi minimises -E[min_i mean_k Q_i(s, a_k)] + alpha * KL(pi || beta), estimated from the same
-//      divergence_samples draws a_k (their policy regularisation, parts/behavior_kl_objective.h).
-//   4. adaptive_multiplier: alpha ascends on alpha * (KL - epsilon); else it stays.
+//   2. y = r + discount * V'(s'), where V' = w min_i Q'_i + (1 - w) max_i Q'_i at one draw a' from pi' (the
+//      paper's weighted mixture of an ensemble, w = target_min_weight). The variant VP (the paper's value
+//      penalty) subtracts alpha * (log pi'(a'|s') - log beta(a'|s')) from V'. Each critic regresses on y.
+//   3. pi minimises -E[min_i mean_k Q_i(s, a_k)] + alpha * KL(pi || beta). Both terms use the same
+//      divergence_samples draws a_k from pi (the paper's policy regularisation,
+//      learner/objectives/behavior_kl_objective.h).
+//   4. With adaptive_multiplier, alpha ascends on alpha * (KL - epsilon). Otherwise alpha is constant.
 //   5. Polyak averaging of the critics and of pi.
-//   6. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin before its step, V its mean over the
-//      draws of step 3.
-// Departures: beta is fitted along with the rest instead of beforehand (warm_start_updates, which leaves the
-// Q term out at first, gives it time); step 3 takes beta from before step 1's gradient step, so that nothing
-// is computed twice; the target's draw is of pi', not of pi.
+//   6. A = Q(s, a) - V(s) for every transition of B. Q is the smaller twin before its step, and V is the mean
+//      of the smaller twin over the draws of step 3.
+// Departures from the paper: beta is fitted during training, not beforehand. (warm_start_updates leaves the Q
+// term out at first and so gives beta time.) Step 3 takes beta from before step 1's gradient step, so that
+// nothing is computed twice. The target's draw comes from pi', not from pi.
 template <class Scalar>
 class Brac : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
  public:
@@ -48,7 +49,7 @@ class Brac : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
   using Base::networks_;
 
   const BracConfig& config() const { return networks_.spec.config.brac(); }
-  // V'(s') [n] into next_value_.
+  // Writes V'(s') [n] into next_value_.
   void ComputeNextValue(const BasicBatch<Scalar>& batch);
   BehaviorKlLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
 

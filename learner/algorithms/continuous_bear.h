@@ -14,22 +14,25 @@
 
 namespace dbr {
 
-// State: policy pi (tanh-Gaussian) with target pi', twin critics with targets, a conditional VAE as the
-// behaviour model, and a multiplier alpha. One update on a batch B drawn uniformly from D:
+// State: a policy pi (tanh-Gaussian) with a target pi', twin critics with targets, a conditional VAE as the
+// behaviour model beta, and a multiplier alpha. One thread at a time. One update on a batch B drawn uniformly
+// from D:
 //   1. The VAE takes a step on its loss over B (nn/cvae.h).
-//   2. y = r + discount * V'(s'), V' the greatest over target_samples draws from pi' of
-//      0.75 min_i Q'_i + 0.25 max_i Q'_i; each critic regresses on y (the paper's algorithm 1).
-//   3. pi minimises -E[min_i mean_k Q_i(s, a_k)] + alpha * (MMD(pi, beta) - eps), a_k policy_samples draws of
-//      pi, the MMD between divergence_samples draws a side of the actions before their tanh, at the same
-//      state; beta's are decoded from latents of N(0, 1) clipped to +-vae_latent_limit (equation 1 and the
-//      paper's section 5). In the first warm_start_updates the Q term is left out.
+//   2. y = r + discount * V'(s'), where V' is the greatest value of w min_i Q'_i + (1 - w) max_i Q'_i over
+//      target_samples draws from pi', w = target_min_weight. Each critic regresses on y (the paper's
+//      algorithm 1).
+//   3. pi minimises -E[min_i mean_k Q_i(s, a_k)] + alpha * (MMD(pi, beta) - eps), where the a_k are
+//      policy_samples draws from pi. The MMD compares divergence_samples actions a side at the same state,
+//      before their tanh. beta's actions are decoded from latents of N(0, 1) clipped to +-vae_latent_limit
+//      (equation 1 and the paper's section 5). In the first warm_start_updates updates the Q term is left
+//      out.
 //   4. alpha ascends on alpha * (MMD(pi, beta) - eps).
 //   5. Polyak averaging of the critics and of pi.
-//   6. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin before its step, V its mean over the
-//      draws of step 3.
-// Departures from the official code: two critics with the smaller one in step 3, where the paper has an
-// ensemble; the Q term draws from pi anew, where the code takes one of the MMD's draws; the limits of pi's
-// log-std are the house's; step 6.
+//   6. A = Q(s, a) - V(s) for every transition of B. Q is the smaller twin before its step, and V is the mean
+//      of the smaller twin over the draws of step 3.
+// Departures from the official code: there are two critics and step 3 takes the smaller one, where the paper
+// has an ensemble. The Q term draws from pi anew, where the code takes one of the MMD's draws. pi's log-std
+// has the limits of this project's policies. Step 6 is added.
 template <class Scalar>
 class ContinuousBear : public ActorCriticAlgorithm<BearNetworks<Scalar>> {
  public:
@@ -64,7 +67,7 @@ class ContinuousBear : public ActorCriticAlgorithm<BearNetworks<Scalar>> {
   VectorX<Scalar> value_;
 };
 
-// InvalidArgument where the divergence is none that samples give: a VAE has no density.
+// Returns InvalidArgument unless the divergence is one that samples can estimate: a VAE has no density.
 absl::Status CheckContinuousBear(const AlgorithmConfig& config, const std::string& env);
 std::unique_ptr<Algorithm> MakeContinuousBear(const AlgorithmSpec& spec);
 

@@ -14,28 +14,31 @@
 
 namespace dbr {
 
-// State: policy pi with target pi', twin critics with targets, the behaviour policies beta+ of D+ and beta-
-// of D- (all three tanh-Gaussian), and a multiplier alpha. One update, with B drawn from D, B+ from D+ and B-
-// from D-:
-//   1. beta+ maximises the mean of log beta+(a|s) over B+, beta- over B- (an empty part skips its step).
-//   2. y = r + discount * V'(s'), V' the greatest over target_samples draws from pi' of
-//      0.75 min_i Q'_i + 0.25 max_i Q'_i; with value_penalty less alpha * D(pi'(.|s'), beta+(.|s')) (the
-//      paper's equation for V under beta+). Each critic regresses on y.
+// State: a policy pi with a target pi', twin critics with targets, the behaviour policies beta+ for D+ and
+// beta- for D- (all three policies are tanh-Gaussian), and a multiplier alpha. One thread at a time. One
+// update, with B drawn from D, B+ from D+ and B- from D-:
+//   1. beta+ maximises the mean of log beta+(a|s) over B+, and beta- does the same over B- (the definitions
+//      above the paper's equation 3). An empty part skips its step.
+//   2. y = r + discount * V'(s'), where V' is the greatest value of w min_i Q'_i + (1 - w) max_i Q'_i over
+//      target_samples draws from pi', w = target_min_weight. With value_penalty, alpha * D(pi'(.|s'),
+//      beta+(.|s')) is subtracted from V' (the paper's equation 3). Each critic regresses on y.
 //   3. pi minimises -E[min_i mean_k Q_i(s, a_k)] + alpha * (D(pi, beta+) - c), the dynamic constraint of the
-//      paper's section "From ARM and BEAR to DBR" (parts/dual_behavior_objective.h).
+//      paper's section "From ARM and BEAR to DBR" (learner/objectives/dual_behavior_objective.h).
 //   4. alpha ascends on alpha * (D(pi, beta+) - c).
 //   5. Polyak averaging of the critics and of pi.
-//   6. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin, V its mean over the draws of step 3.
+//   6. A = Q(s, a) - V(s) for every transition of B. Q is the smaller twin, and V is the mean of the smaller
+//      twin over the draws of step 3.
 //
-// With advantage SIL (the paper's section "ARM and SIL"; Oh et al. 2018) step 6 takes A = reward_scale * R -
-// V(s), R the Monte-Carlo return, and beta+ is not fitted to B+ but after step 6, in a step of its own, to B:
-// it maximises the mean of w log beta+(a|s), w = max(A, 0) divided by its mean over B (skipped where all are
-// 0). The critics take no part in it.
-// With munchausen_weight w the r of step 2 is r + w * log beta+(a|s), the log clipped to [-1, 0], before it
-// is scaled (the paper's section on ablations), beta+ being that of step 1.
-// With constraint NONE step 3 has no second term, and there is no step 4.
+// Advantage SIL (the paper's section "ARM and SIL"; Oh et al. 2018): step 6 takes A = reward_scale * R -
+// V(s), where R is the Monte-Carlo return. beta+ is then fitted after step 6, in a step of its own, and to B
+// instead of B+. It maximises the mean of w log beta+(a|s), where w = max(A, 0) divided by its mean over B.
+// The step is skipped where all w are 0. The critics take no part in it.
+// munchausen_weight w: the reward of step 2 becomes r + w * log beta+(a|s), with the log clipped to [-1, 0],
+// before it is scaled (the paper's section on ablations). beta+ is the one that step 1 left.
+// Constraint NONE: step 3 has no second term, and there is no step 4.
 //
-// Departures: step 6 takes Q(s, a) from before step 2's gradient step, so that nothing is computed twice.
+// Departure from the paper: step 6 takes Q(s, a) from before step 2's gradient step, so that nothing is
+// computed twice.
 template <class Scalar>
 class ContinuousDbr : public ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>> {
  public:
@@ -53,14 +56,14 @@ class ContinuousDbr : public ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>> 
 
   const DbrConfig& config() const { return networks_.config(); }
   void FitBehaviors(const BasicBatch<Scalar>& plus, const BasicBatch<Scalar>& minus);
-  // V'(s') [n] into next_value_.
+  // Writes V'(s') [n] into next_value_.
   void ComputeNextValue(const BasicBatch<Scalar>& batch);
-  // beta+ and beta- at the batch's states.
+  // Evaluates beta+ and beta- at the batch's states.
   void EvaluateBehaviors(const BasicBatch<Scalar>& batch);
-  // After EvaluateBehaviors: what rewards are raised by [n], or null.
+  // Returns the bonus that is added to the rewards [n], or null for none. EvaluateBehaviors comes first.
   const VectorX<Scalar>* RewardBonus(const BasicBatch<Scalar>& batch);
   PolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
-  // After ImprovePolicy: the advantages, and self-imitation's fit.
+  // Sets the advantages and makes self-imitation's fit. ImprovePolicy comes first.
   void JudgeAndImitate(const BasicBatch<Scalar>& batch);
   void DrawDivergenceNoise(Eigen::Index n);
 

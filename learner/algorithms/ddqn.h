@@ -11,18 +11,19 @@
 
 namespace dbr {
 
-// State: one network Q [actions] with a target Q'. One update on a batch B drawn uniformly from D:
-//   1. y = r + discount * Q'(s', argmax_a Q(s', a)), a over the legal actions of s' (equation 4); Q regresses
-//      on y by the mean squared error.
+// State: one network Q [actions] with a target Q'. One thread at a time. One update on a batch B drawn
+// uniformly from D:
+//   1. y = r + discount * Q'(s', argmax_a Q(s', a)), where a runs over the legal actions of s' (equation 4).
+//      Q regresses on y by the mean squared error.
 //   2. Polyak averaging of the target.
-//   3. A = Q(s, a) - max_a Q(s, a) of every transition of B, Q from before its step, the maximum over the
-//   legal
-//      actions.
-// Departures: the target moves by Polyak averaging, not by a copy every so many updates; the optimizer is
-// Adam; errors are not clipped. Exploration is the actors' (docs/operations.md). What it exports: the network
-// as the policy, so that the mode MODE plays the greatest Q and SAMPLE draws from a softmax of Q, and once
-// more as each of the two critics, so that GREEDY_Q and `dbr probe` read Q. An actor's first advantage is
-// therefore Q(s, a) less the mean of Q under that softmax; the learner's takes its place.
+//   3. A = Q(s, a) - max_a Q(s, a) for every transition of B, with Q from before its step and the maximum
+//      over the legal actions.
+// Departures from the paper: the target moves by Polyak averaging, not by a copy after a fixed number of
+// updates. The optimizer is Adam. Errors are not clipped. The actors explore (docs/operations.md).
+// The network is exported as the policy: the mode MODE plays the greatest Q, and SAMPLE draws from a softmax
+// of Q. It is exported again as each of the two critics, so that GREEDY_Q and `dbr probe` can read Q. An
+// actor's first advantage is therefore Q(s, a) minus the mean of Q under that softmax. The learner's
+// advantage replaces it later.
 template <class Scalar>
 class Ddqn {
  public:

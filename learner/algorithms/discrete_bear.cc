@@ -58,7 +58,7 @@ ConstrainedLoss<Scalar> DiscreteBear<Scalar>::ImprovePolicy(const BasicBatch<Sca
 template <class Scalar>
 double DiscreteBear<Scalar>::UpdateFlops() const {
   const Eigen::Index n = this->needs().uniform;
-  // beta, pi' and pi, and the steps of beta and pi.
+  // The forward passes of beta, pi' and pi, and the steps of beta and pi.
   const MlpShape& shape = networks_.policy.shape();
   return 3 * shape.ForwardFlops(n) + 2 * shape.ParameterGradientFlops(n) + networks_.critics.TargetFlops(n) +
          networks_.critics.FitFlops(n);

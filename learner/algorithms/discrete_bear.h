@@ -1,5 +1,5 @@
-// Bootstrapping Error Accumulation Reduction (Kumar et al. 2019) over discrete actions, on the form of
-// discrete SAC (Christodoulou 2019).
+// Bootstrapping Error Accumulation Reduction (Kumar et al. 2019) over discrete actions, built on discrete SAC
+// (Christodoulou 2019).
 #pragma once
 
 #include <memory>
@@ -12,19 +12,21 @@
 
 namespace dbr {
 
-// State: policy pi (a softmax over the legal actions) with target pi', twin critics with targets, a behaviour
-// policy beta of pi's shape, and a multiplier alpha. One update on a batch B drawn uniformly from D:
+// State: a policy pi (a softmax over the legal actions) with a target pi', twin critics with targets, a
+// behaviour policy beta of pi's shape, and a multiplier alpha. One thread at a time. One update on a batch B
+// drawn uniformly from D:
 //   1. beta maximises the mean of log beta(a|s) over B.
-//   2. y = r + discount * V'(s'), V' the expectation under pi' of 0.75 min_i Q'_i + 0.25 max_i Q'_i; each
-//      critic regresses on y.
-//   3. pi minimises -E[min_i E_pi Q_i] - entropy_weight * H(pi) + alpha * (D(pi, beta) - eps), D exact. In
-//      the first warm_start_updates the Q term is left out.
+//   2. y = r + discount * V'(s'), where V' is the expectation under pi' of w min_i Q'_i + (1 - w) max_i Q'_i,
+//      w = target_min_weight. Each critic regresses on y.
+//   3. pi minimises -E[min_i E_pi Q_i] - entropy_weight * H(pi) + alpha * (D(pi, beta) - eps), with D exact.
+//      In the first warm_start_updates updates the Q term is left out.
 //   4. alpha ascends on alpha * (D(pi, beta) - eps).
 //   5. Polyak averaging of the critics and of pi.
-//   6. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin, V its expectation under pi.
-// Departures: BEAR is for continuous actions; here expectations are exact where it samples, and beta is a
-// softmax in place of the VAE. Steps 3 and 6 use beta's, the critics' and the policy's values from before
-// their steps of this update, so that nothing is computed twice.
+//   6. A = Q(s, a) - V(s) for every transition of B. Q is the smaller twin, and V is its expectation under
+//      pi.
+// Departures from the paper: BEAR is for continuous actions. Here expectations are exact where BEAR samples,
+// and beta is a softmax in place of the VAE. Steps 3 and 6 use beta, the critics and the policy as they were
+// before their steps in this update, so that nothing is computed twice.
 template <class Scalar>
 class DiscreteBear : public ActorCriticAlgorithm<BearNetworks<Scalar>> {
  public:

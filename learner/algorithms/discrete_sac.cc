@@ -7,7 +7,7 @@
 namespace dbr {
 namespace {
 
-constexpr int kSmaller = 1;  // the weight of the smaller twin in a value: all
+constexpr int kSmaller = 1;  // a value takes the smaller twin alone
 
 }  // namespace
 
@@ -41,7 +41,7 @@ void DiscreteSac<Scalar>::ComputeTarget(const BasicBatch<Scalar>& batch) {
   CriticTarget(batch, networks_.spec.config.reward_scale(), next_value_, &target_);
 }
 
-// And what every transition's advantage is.
+// Improves the policy and sets the advantage of every transition.
 template <class Scalar>
 SoftPolicyLoss<Scalar> DiscreteSac<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
   const MatrixX<Scalar>&q1 = networks_.critics.q1(), &q2 = networks_.critics.q2();

@@ -11,19 +11,19 @@
 
 namespace dbr {
 
-// State: policy pi, twin critics with targets, a temperature. Expectations over actions are exact sums over
-// the legal ones. One update on a batch B drawn uniformly from D:
-//   1. y = r + discount * sum_a pi(a|s') (min_i Q'_i(s', a) - temperature * log pi(a|s')) (equation 10); each
+// State: a policy pi, twin critics with targets and a temperature. Expectations over actions are exact sums
+// over the legal actions. One thread at a time. One update on a batch B drawn uniformly from D:
+//   1. y = r + discount * sum_a pi(a|s') (min_i Q'_i(s', a) - temperature * log pi(a|s')) (equation 10). Each
 //      critic regresses on y.
 //   2. pi minimises E[sum_a pi(a|s) (temperature * log pi(a|s) - min_i Q_i(s, a))] (equation 12).
-//   3. The temperature rises where the entropy is below its target, and falls above it (equation 11). The
-//   target
-//      is target_entropy_ratio * log(number of legal actions) of each state, both averaged over B.
+//   3. The temperature rises where the entropy is below its target and falls above it (equation 11). The
+//      target is target_entropy_ratio * log(number of legal actions) for each state. Both are averaged over
+//      B.
 //   4. Polyak averaging of the critics.
-//   5. A = min_i Q_i(s, a) - sum_a pi(a|s) min_i Q_i(s, a) of every transition of B.
-// Departures: steps 2 and 5 use the critics' values from before step 1's gradient step, and step 5 the
-// policy's from before step 2's, so that nothing is computed twice; the temperature is the exponential of
-// what Adam moves.
+//   5. A = min_i Q_i(s, a) - sum_a pi(a|s) min_i Q_i(s, a) for every transition of B.
+// Departures from the paper: steps 2 and 5 use the critics' values from before step 1's gradient step, and
+// step 5 uses the policy from before step 2's, so that nothing is computed twice. Adam moves the log of the
+// temperature.
 template <class Scalar>
 class DiscreteSac : public ActorCriticAlgorithm<SoftNetworks<Scalar>> {
  public:

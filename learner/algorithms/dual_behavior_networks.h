@@ -1,5 +1,5 @@
-// What DBR trains, whatever the actions: an actor-critic, the behaviour policies of D+ and D- and the
-// multiplier, and the parts of an update that do not depend on the kind of action.
+// What DBR trains, over either kind of action: an actor-critic, the behaviour policies for D+ and D-, and the
+// multiplier. The parts of an update that do not depend on the kind of action are here too.
 #pragma once
 
 #include <string>
@@ -13,14 +13,15 @@
 
 namespace dbr {
 
-// Losses of one update's fits.
+// The losses of the fits of one update.
 template <class Scalar>
 struct FitLosses {
-  Scalar critic = 0;      // the twins' mean
+  Scalar critic = 0;      // the mean of the twins' losses
   Scalar beta_plus = 0;   // mean of -log beta+(a|s)
   Scalar beta_minus = 0;  // mean of -log beta-(a|s)
 };
 
+// DBR's networks. The algorithm owns them. One thread at a time.
 template <class Scalar>
 struct DualBehaviorNetworks : ActorCritic<Scalar> {
   explicit DualBehaviorNetworks(const AlgorithmSpec& spec)
@@ -33,7 +34,7 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
   const DbrConfig& config() const { return this->spec.config.dbr(); }
   BatchNeeds needs() const { return DualBehaviorNeeds(this->spec.config); }
 
-  // The multiplier of the divergence; 0 where there is no constraint.
+  // The multiplier of the divergence. It is 0 where there is no constraint.
   Scalar alpha() const { return constrained ? multiplier.value() : Scalar{0}; }
 
   // Sets the learning rate of this update.
@@ -43,14 +44,14 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
     beta_minus.set_learning_rate(learning_rate);
   }
 
-  // The multiplier's step, and the targets'.
+  // Ends an update: one step of the multiplier and of the targets.
   void Finish(const PolicyLoss<Scalar>& loss) {
     if (constrained) multiplier.Step(loss.divergence_plus - loss.threshold);
     this->UpdateTargets();
     ++this->updates;
   }
 
-  // Useful operations of the policies: both fits, and all forward passes.
+  // The useful floating-point operations of the policies: the fits and all forward passes.
   double PolicyFlops() const {
     const MlpShape& shape = this->policy.shape();
     const BatchNeeds batch = needs();
@@ -58,9 +59,9 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
     for (const int behavior : {batch.plus, batch.minus}) {
       flops += shape.ForwardFlops(behavior) + shape.ParameterGradientFlops(behavior);
     }
-    // Self-imitation fits beta+ to B, where it was evaluated already.
+    // Self-imitation fits beta+ to B. Its forward pass at s is counted below.
     if (batch.plus == 0) flops += shape.ParameterGradientFlops(batch.uniform);
-    // pi, beta+ and beta- at s; at s' the target pi', and beta+ where the value is penalised.
+    // At s: pi, beta+ and beta-. At s': the target pi', and beta+ too where the value is penalised.
     const int forward = config().value_penalty() && constrained ? 5 : 4;
     return flops + forward * shape.ForwardFlops(batch.uniform) + shape.ParameterGradientFlops(batch.uniform);
   }
@@ -73,7 +74,7 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
             {"train/advantage_positive"}, {"train/advantage_std"}};
   }
 
-  // Sets `metrics`; Internal where one is not finite.
+  // Sets `metrics`. Returns Internal where a value is not finite.
   absl::Status Report(const FitLosses<Scalar>& fits, const PolicyLoss<Scalar>& loss, Scalar target_mean,
                       std::vector<UpdateMetric>* metrics) const {
     const AdvantageFigures figures = FiguresOf(this->advantages);

@@ -9,10 +9,11 @@
 namespace dbr {
 namespace {
 
-constexpr float kLeastDeviation = 1e-3f;  // of a feature that hardly moves
+constexpr float kLeastDeviation = 1e-3f;  // the least deviation to divide by
 
-// Mean and variance of each feature over all columns seen, by the pairwise update of Chan, Golub and LeVeque
-// (1983). Single precision, as checkpoints keep it, so that a resumed estimate goes on bit for bit.
+// The mean and variance of each feature over all columns seen, by the pairwise update of Chan, Golub and
+// LeVeque (1983). They are in single precision, as checkpoints keep them, so that a resumed estimate
+// continues bit for bit.
 class FeatureStatistics {
  public:
   explicit FeatureStatistics(int features)

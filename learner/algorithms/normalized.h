@@ -1,4 +1,4 @@
-// Any algorithm on normalised observations.
+// Runs any algorithm on normalised observations.
 #pragma once
 
 #include <memory>
@@ -7,8 +7,9 @@
 
 namespace dbr {
 
-// `inner` sees (observation - mean) / deviation of each feature, estimated from all that was drawn uniformly
-// so far; the estimate travels with the policy (kObservationNormalizer) and with the checkpoint.
+// Wraps `inner` and owns it. `inner` sees (observation - mean) / deviation for each feature. Both are
+// estimated from all observations that were drawn uniformly so far. The estimate is exported with the policy
+// (kObservationNormalizer) and saved in the checkpoint.
 std::unique_ptr<Algorithm> Normalized(const AlgorithmSpec& spec, std::unique_ptr<Algorithm> inner);
 
 }  // namespace dbr

@@ -28,7 +28,7 @@ struct Entry {
   std::unique_ptr<Algorithm> (*make)(const AlgorithmSpec&);
   const char* source;    // the publication
   const char* variants;  // the fields of its config message that choose between variants
-  // InvalidArgument where a variant does not serve these actions; null: all do.
+  // Returns InvalidArgument where a variant does not serve these actions. Null where all variants do.
   absl::Status (*check)(const AlgorithmConfig&, const std::string& env) = nullptr;
 };
 

@@ -13,16 +13,17 @@
 
 namespace dbr {
 
-// Makes the algorithm that spec.config names. Errors: CheckServes.
+// Makes the algorithm that spec.config names. Returns the errors of CheckServes.
 absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& spec);
 
-// InvalidArgument, naming those that do, unless the algorithm that `config` sets serves the actions of the
-// environment; or, naming the field, where the variant that it chooses does not.
+// Checks that the algorithm that `config` sets serves the environment's actions. Returns InvalidArgument
+// otherwise, with the names of those that do. Where only a chosen variant does not serve them, the error
+// names its field.
 absl::Status CheckServes(const AlgorithmConfig& config, const std::string& env, const ActionSpace& actions);
 
-// All algorithms, once for each kind of action that they serve; the conformance suite walks them.
+// All algorithms, once for each kind of action that they serve. The conformance suite tests each of them.
 struct AlgorithmId {
-  std::string name;  // as the member of AlgorithmConfig's oneof that sets it
+  std::string name;  // the member of AlgorithmConfig's oneof that sets it
   ActionKind actions;
   std::string source;    // the publication
   std::string variants;  // the fields of its config message that choose between variants; may be empty

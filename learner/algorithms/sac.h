@@ -15,14 +15,16 @@
 
 namespace dbr {
 
-// State: policy pi, twin critics with targets, a temperature. One update on a batch B drawn uniformly from D:
-//   1. y = r + discount * (min_i Q'_i(s', a') - temperature * log pi(a'|s')), a' drawn from pi
-//      (equations 3 and 5); each critic regresses on y.
-//   2. pi minimises E[temperature * log pi(a|s) - min_i Q_i(s, a)], a drawn through pi (equation 9).
-//   3. The temperature rises where the entropy is below its target, and falls above it (equation 18).
+// State: a policy pi, twin critics with targets and a temperature. One thread at a time. One update on a
+// batch B drawn uniformly from D:
+//   1. y = r + discount * (min_i Q'_i(s', a') - temperature * log pi(a'|s')), where a' is drawn from pi
+//      (equations 3 and 5). Each critic regresses on y.
+//   2. pi minimises E[temperature * log pi(a|s) - min_i Q_i(s, a)], where a is drawn from pi and the gradient
+//      flows through the draw (equation 9).
+//   3. The temperature rises where the entropy is below its target and falls above it (equation 18).
 //   4. Polyak averaging of the critics.
-//   5. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin before its step, V at the action that
-//      step 2 drew.
+//   5. A = Q(s, a) - V(s) for every transition of B. Q is the smaller twin before its step, and V is the
+//      smaller twin at the action that step 2 drew.
 template <class Scalar>
 class Sac : public ActorCriticAlgorithm<SoftNetworks<Scalar>> {
  public:

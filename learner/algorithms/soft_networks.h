@@ -1,5 +1,5 @@
-// What SAC trains, whatever the actions: an actor-critic and its temperature, and the parts of an update that
-// do not depend on the kind of action.
+// What SAC trains, over either kind of action: an actor-critic and its temperature. The parts of an update
+// that do not depend on the kind of action are here too.
 #pragma once
 
 #include <vector>
@@ -12,27 +12,29 @@
 
 namespace dbr {
 
-// A temperature may fall low where rewards are small; above e^5 it is out of hand.
+// The limits of log(temperature). A temperature may fall low where rewards are small. Above e^5 training has
+// failed.
 inline constexpr MultiplierLimits kTemperatureLimits{.min_log = -20, .max_log = 5};
 
+// SAC's networks. The algorithm owns them. One thread at a time.
 template <class Scalar>
 struct SoftNetworks : ActorCritic<Scalar> {
-  // `config` is the SacConfig or the DiscreteSacConfig of the spec.
+  // `config` is the spec's SacConfig or DiscreteSacConfig.
   template <class TemperatureConfig>
   SoftNetworks(const AlgorithmSpec& spec, const TemperatureConfig& config)
       : ActorCritic<Scalar>(spec, /*policy_target=*/false),
         temperature(config.first_temperature(), config.temperature_learning_rate(), kTemperatureLimits) {}
 
-  // The temperature's step (it rises while the policy's entropy is below target_entropy, both in nats), and
-  // the targets'.
+  // Ends an update: one step of the temperature and of the targets. The temperature rises while the policy's
+  // entropy is below target_entropy. Both are in nats.
   void Finish(const SoftPolicyLoss<Scalar>& loss, Scalar target_entropy) {
     temperature.Step(target_entropy - loss.entropy);
     this->UpdateTargets();
     ++this->updates;
   }
 
-  // Useful operations for n samples of what both kinds of action need: the critics' targets and fits, the
-  // policy at s and s', and its gradient.
+  // The useful floating-point operations, for n samples, that both kinds of action need: the critics' targets
+  // and fits, the policy at s and s', and its gradient.
   double UpdateFlops(Eigen::Index n) const {
     const MlpShape& shape = this->policy.shape();
     return this->critics.TargetFlops(n) + this->critics.FitFlops(n) + 2 * shape.ForwardFlops(n) +
@@ -45,7 +47,7 @@ struct SoftNetworks : ActorCritic<Scalar> {
             {"train/advantage_mean"}, {"train/advantage_positive"}, {"train/advantage_std"}};
   }
 
-  // Sets `metrics`; Internal where one is not finite.
+  // Sets `metrics`. Returns Internal where a value is not finite.
   absl::Status Report(Scalar critic_loss, const SoftPolicyLoss<Scalar>& loss, Scalar target_mean,
                       std::vector<UpdateMetric>* metrics) const {
     const AdvantageFigures figures = FiguresOf(this->advantages);

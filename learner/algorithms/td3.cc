@@ -69,7 +69,8 @@ double Td3<Scalar>::UpdateFlops() const {
   const TwinCritic<Scalar>& critics = networks_.critics;
   const MlpShape& policy = networks_.policy.shape();
   const double delayed = critics.FirstInputGradientFlops(n) + policy.ParameterGradientFlops(n);
-  // The critics' targets at s', the critics at pi(s); pi' at s', pi at s.
+  // The targets of the critics at s' and the critics at pi(s) cost the same. The policy is evaluated as pi'
+  // at s' and as pi at s.
   return critics.FitFlops(n) + 2 * critics.TargetFlops(n) + 2 * policy.ForwardFlops(n) +
          delayed / config().policy_delay();
 }

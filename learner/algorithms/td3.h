@@ -13,16 +13,18 @@
 
 namespace dbr {
 
-// State: a deterministic policy pi(s) = tanh(mean(s)) with target pi', twin critics with targets. The policy
-// is the Gaussian network that actors and files know, its log-stds pinned to the lower limit: sampling it
-// gives its mode but for e^-20. One update (algorithm 1) on a batch B drawn uniformly from D:
-//   1. y = r + discount * min_i Q'_i(s', clip(pi'(s') + noise, +-1)), the noise normal with deviation
-//      target_noise, clipped to +-target_noise_limit; each critic regresses on y.
-//   2. Every policy_delay updates: pi minimises -E[Q_1(s, pi(s))]; Polyak averaging of the critics and of pi.
-//   3. A = Q(s, a) - V(s) of every transition of B, Q the smaller twin before its step, V at pi(s) before
-//      step 2's.
-// Departures: of policy_delay updates the first, not the last, moves the policy; the noise of exploration is
-// the actors' (actor.mode MODE with actor.action_noise).
+// State: a deterministic policy pi(s) = tanh(mean(s)) with a target pi', and twin critics with targets. The
+// policy is the Gaussian network that actors and files know, with its log-stds fixed at the lower limit: a
+// sample differs from its mode by a deviation of e^-20. One thread at a time. One update (algorithm 1) on a
+// batch B drawn uniformly from D:
+//   1. y = r + discount * min_i Q'_i(s', clip(pi'(s') + noise, +-1)). The noise is normal with deviation
+//      target_noise, clipped to +-target_noise_limit. Each critic regresses on y.
+//   2. Every policy_delay updates, pi minimises -E[Q_1(s, pi(s))], and the critics and pi are Polyak
+//      averaged.
+//   3. A = Q(s, a) - V(s) for every transition of B. Q is the smaller twin before its step, and V is the
+//      smaller twin at pi(s) before step 2's step.
+// Departures from the paper: of policy_delay updates the first one moves the policy, not the last. The actors
+// add the exploration noise (actor.mode MODE with actor.action_noise).
 template <class Scalar>
 class Td3 : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
  public:
@@ -41,7 +43,7 @@ class Td3 : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
 
   const Td3Config& config() const { return networks_.spec.config.td3(); }
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
-  // Steps 2 and 3; the policy's loss, also where it does not move.
+  // Makes steps 2 and 3. Returns the policy's loss, also in an update that does not move the policy.
   Scalar ImprovePolicy(const BasicBatch<Scalar>& batch);
 
   GaussianHead<Scalar> pi_, next_pi_;
