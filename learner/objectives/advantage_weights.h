@@ -13,8 +13,8 @@ struct AdvantageWeighting {
   double max_weight = 100;  // above 0
 };
 
-// [n] min(exp(A / lambda), max_weight) (Nair et al. 2020, the weights of the policy's step). Never infinite;
-// a NaN stays one.
+// Sets `weights` [n] to min(exp(A / lambda), max_weight) (Nair et al. 2020, the weights of the policy's step)
+// for the advantages A [n]. A weight is never infinite. A NaN stays a NaN.
 template <class Scalar>
 void AdvantageWeights(const VectorX<Scalar>& advantages, const AdvantageWeighting& options,
                       VectorX<Scalar>* weights) {

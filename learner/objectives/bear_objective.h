@@ -7,22 +7,24 @@
 
 namespace dbr {
 
-// The policy at the states of a batch, what it draws, and samples of the behaviour model; both sides of the
-// divergence have `samples` columns a state, sample i of state s in column s * samples + i.
+// What the loss is taken at: the policy at the states of a batch with the noise of its draws, and samples of
+// the behaviour model. Both sides of the divergence have `samples` columns for each state. Sample i of state
+// s is column s * samples + i.
 template <class Scalar>
 struct BearDraws {
   PolicyDraws<Scalar> policy;
-  const MatrixX<Scalar>& divergence_noise;  // [dimensions x n * samples] of pi
+  const MatrixX<Scalar>& divergence_noise;  // the noise of pi's samples
   const MatrixX<Scalar>& behavior;          // [dimensions x n * samples] actions before their tanh
 };
 
-// Workspaces, reused from batch to batch.
+// Computes the loss, with workspaces that are reused from batch to batch. One thread at a time.
 template <class Scalar>
 class BearObjective {
  public:
-  // -E[min_i mean_k Q_i(s, a_k)] + alpha * (D(pi, beta) - eps), D the sampled MMD of the actions before the
-  // tanh (nn/divergence.h) and its mean over the batch, and the gradient with respect to the output of pi's
-  // network [2 * dimensions x n]. The critics' weights, beta's samples and alpha are constants.
+  // Returns -E[min_i mean_k Q_i(s, a_k)] + alpha * (D(pi, beta) - eps) (Kumar et al. 2019, equation 1). D is
+  // the mean over the batch of the sampled MMD between the actions before the tanh (nn/divergence.h). With
+  // options.use_q false the first term is 0. `d_output` [2 * dimensions x n] becomes the gradient with
+  // respect to the output of pi's network. The critics' weights, beta's samples and alpha are constants.
   ConstrainedLoss<Scalar> Compute(const PolicyLossOptions& options, const BearDraws<Scalar>& at, Scalar alpha,
                                   TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output) {
     const GaussianHead<Scalar>& pi = at.policy.pi;

@@ -16,7 +16,7 @@ struct BehaviorKlLoss {
   Scalar entropy = 0;     // mean of -log pi(a|s) over the draws, nats
 };
 
-// What the loss is taken at: the two policies at the states of a batch, and pi's draws.
+// What the loss is taken at: the two policies at the states of a batch, and the noise of pi's draws.
 template <class Scalar>
 struct BehaviorKlInputs {
   const GaussianHead<Scalar>& pi;
@@ -24,14 +24,14 @@ struct BehaviorKlInputs {
   const MatrixX<Scalar>& noise;  // [dimensions x draws * n]
 };
 
-// Workspaces, reused from batch to batch.
+// Computes the loss, with workspaces that are reused from batch to batch. One thread at a time.
 template <class Scalar>
 class BehaviorKlObjective {
  public:
-  // -E[min_i mean_k Q_i(s, a_k)] + alpha * E[mean_k (log pi(a_k|s) - log beta(a_k|s))] (the policy's
-  // objective of Wu et al. 2019, its divergence the KL estimated from samples), both terms over the same
-  // draws a_k of pi, and its gradient with respect to the output of pi's network [2 * dimensions x n],
-  // pathwise through the draws. beta, the critics' weights and alpha are constants. With use_q false the
+  // Returns -E[min_i mean_k Q_i(s, a_k)] + alpha * E[mean_k (log pi(a_k|s) - log beta(a_k|s))] (the policy's
+  // objective of Wu et al. 2019, with the KL estimated from samples). Both terms use the same draws a_k from
+  // pi. `d_output` [2 * dimensions x n] becomes the gradient with respect to the output of pi's network,
+  // which flows through the draws. beta, the critics' weights and alpha are constants. With use_q false the
   // first term is 0.
   BehaviorKlLoss<Scalar> Compute(const BehaviorKlInputs<Scalar>& inputs, const MatrixX<Scalar>& observations,
                                  Scalar alpha, bool use_q, TwinCritic<Scalar>* critics,

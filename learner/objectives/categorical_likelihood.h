@@ -1,4 +1,4 @@
-// Fitting a policy over discrete actions to the actions of data by maximum likelihood.
+// Fits a policy over discrete actions to the actions of data by maximum likelihood.
 #pragma once
 
 #include "core/batch.h"
@@ -7,12 +7,14 @@
 
 namespace dbr {
 
-// The policy at the states of its newest use, with workspaces; reused from batch to batch.
+// Holds the policy's distribution from its newest use and workspaces, which are reused from batch to batch.
+// One thread at a time.
 template <class Scalar>
 class CategoricalLikelihood {
  public:
-  // One step on the mean over the batch of -w log p(a|s); weights [n] are constants, null: all 1. Keeps the
-  // loss and the distribution from before the step, and does nothing on an empty batch.
+  // Makes one step of `network` on the mean over the batch of -w log p(a|s). The weights [n] are constants;
+  // null means that all are 1. Keeps the loss and the distribution from before the step. Does nothing on an
+  // empty batch.
   void Fit(const BasicBatch<Scalar>& batch, const VectorX<Scalar>* weights, TrainedNetwork<Scalar>* network) {
     if (batch.size() == 0) return;
     MaskedSoftmax<Scalar>(network->Forward(batch.observations), batch.masks, &distribution_);
@@ -20,7 +22,7 @@ class CategoricalLikelihood {
     network->Step(batch.observations, d_logits_);
   }
 
-  // Evaluates the policy; no gradient is taken.
+  // Evaluates the policy without a gradient. The result is valid until the next call of Fit or At.
   const Categorical<Scalar>& At(const MatrixX<Scalar>& observations, const MatrixX<Scalar>& masks,
                                 TrainedNetwork<Scalar>* network) {
     MaskedSoftmax<Scalar>(network->Evaluate(observations), masks, &distribution_);
@@ -28,7 +30,7 @@ class CategoricalLikelihood {
   }
 
   const Categorical<Scalar>& distribution() const { return distribution_; }
-  Scalar loss() const { return loss_; }  // of the newest Fit
+  Scalar loss() const { return loss_; }  // the loss of the newest Fit
 
  private:
   Categorical<Scalar> distribution_;

@@ -25,7 +25,7 @@ void GreatestTargetValue(const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<
     const Scalar low = std::min(q1(0, j), q2(0, j)), high = std::max(q1(0, j), q2(0, j));
     const Scalar each = min_weight * low + (1 - min_weight) * high;
     Scalar& greatest = (*value)[j % n];
-    // Not std::max: a NaN of the critics must not vanish.
+    // std::max would lose a NaN of the critics.
     if (j < n || !(each <= greatest)) greatest = each;
   }
 }

@@ -1,4 +1,4 @@
-// The step of the twin critics over continuous actions, which all algorithms there have in common.
+// The step of the twin critics that all algorithms over continuous actions share.
 #pragma once
 
 #include "core/batch.h"
@@ -8,13 +8,13 @@
 
 namespace dbr {
 
-// Workspaces, reused from batch to batch.
+// Fits the critics, with workspaces that are reused from batch to batch. One thread at a time.
 template <class Scalar>
 class CriticRegression {
  public:
-  // One step of both critics on the mean of (Q_i(s, a) - y)^2, y = reward_scale * r + discount * V'(s') a
-  // constant. next_value [n] is V'(s'). With `bonus` [n] the rewards are r + bonus. Gives the two losses'
-  // mean.
+  // Makes one step of both critics on the mean of (Q_i(s, a) - y)^2, where y = reward_scale * r + discount *
+  // V'(s') is a constant. next_value [n] is V'(s'). With `bonus` [n] the rewards are r + bonus. Returns the
+  // mean of the two losses. The batch must not be empty.
   Scalar Fit(const BasicBatch<Scalar>& batch, double reward_scale, const VectorX<Scalar>& next_value,
              TwinCritic<Scalar>* critics, const VectorX<Scalar>* bonus = nullptr) {
     CriticTarget(batch, reward_scale, next_value, &target_);
@@ -30,7 +30,7 @@ class CriticRegression {
   }
 
   const VectorX<Scalar>& target() const { return target_; }  // [n] y
-  // [n] the smaller twin at the batch's actions, from before the step.
+  // [n] The smaller twin at the batch's actions, from before the step.
   const VectorX<Scalar>& behavior_value() const { return behavior_value_; }
 
  private:

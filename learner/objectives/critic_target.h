@@ -1,11 +1,12 @@
-// What critics regress on.
+// The target that critics regress on.
 #pragma once
 
 #include "core/batch.h"
 
 namespace dbr {
 
-// y [n] = reward_scale * r + discount * V'(s'); next_value [n] is V'(s') and may be `target` itself.
+// Sets `target` [n] to y = reward_scale * r + discount * V'(s'). next_value [n] is V'(s') and may be `target`
+// itself.
 template <class Scalar>
 void CriticTarget(const BasicBatch<Scalar>& batch, double reward_scale, const VectorX<Scalar>& next_value,
                   VectorX<Scalar>* target) {

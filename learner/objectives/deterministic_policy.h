@@ -1,4 +1,4 @@
-// TD3's deterministic policy: its representation, its smoothed target actions, and its loss with its
+// TD3's deterministic policy: how it is represented, its smoothed target actions, and its loss with the
 // gradient.
 #pragma once
 
@@ -8,9 +8,9 @@
 
 namespace dbr {
 
-// Makes a Gaussian network [input -> 2 * dimensions] deterministic but for a deviation of e^-20: the rows of
-// its last layer that give the log-stds become weight 0 and bias at the lower limit. Without a gradient they
-// stay so.
+// Makes a Gaussian network [input -> 2 * dimensions] deterministic, except for a deviation of e^-20. In the
+// last layer, the rows that give the log-stds get weight 0 and a bias at the lower limit. They get no
+// gradient and so do not change.
 template <class Scalar>
 void PinLogStd(const MlpShape& shape, VectorX<Scalar>* parameters) {
   const int last = shape.layer_count() - 1, dimensions = shape.output_size() / 2;
@@ -22,12 +22,12 @@ void PinLogStd(const MlpShape& shape, VectorX<Scalar>* parameters) {
 }
 
 struct SmoothingOptions {
-  double deviation = 0;  // of the noise, in units of the action
-  double limit = 0;      // of the noise, either side
+  double deviation = 0;  // the noise's standard deviation, in units of the action
+  double limit = 0;      // the noise is clipped to +-limit, in units of the action
 };
 
-// clip(tanh(mean) + clip(deviation * noise, +-limit), +-1) [dimensions x n] (Fujimoto et al. 2018, section
-// 5.3); noise is standard normal, and everything [dimensions x n].
+// Sets `actions` to clip(tanh(mean) + clip(deviation * noise, +-limit), +-1) (Fujimoto et al. 2018, section
+// 5.3). `noise` is standard normal. All matrices are [dimensions x n].
 template <class Scalar>
 void SmoothedActions(const MatrixX<Scalar>& mean, const MatrixX<Scalar>& noise,
                      const SmoothingOptions& options, MatrixX<Scalar>* actions) {
@@ -38,12 +38,12 @@ void SmoothedActions(const MatrixX<Scalar>& mean, const MatrixX<Scalar>& noise,
                  .matrix();
 }
 
-// Workspaces, reused from batch to batch.
+// Computes the loss, with workspaces that are reused from batch to batch. One thread at a time.
 template <class Scalar>
 class DeterministicPolicyObjective {
  public:
-  // -E[Q_1(s, tanh(mean(s)))] (Fujimoto et al. 2018, algorithm 1; Silver et al. 2014). Both critics are
-  // evaluated: value1(), value2() of `critics` are theirs at the policy's actions.
+  // Returns -E[Q_1(s, tanh(mean(s)))] (Fujimoto et al. 2018, algorithm 1; Silver et al. 2014). Both critics
+  // are evaluated: value1() and value2() of `critics` are then their values at the policy's actions.
   Scalar Evaluate(const GaussianHead<Scalar>& pi, const MatrixX<Scalar>& observations,
                   TwinCritic<Scalar>* critics) {
     noise_.setZero(pi.mean().rows(), pi.mean().cols());
@@ -52,8 +52,8 @@ class DeterministicPolicyObjective {
     return -critics->value1().mean();
   }
 
-  // The gradient of the newest Evaluate with respect to the output of the policy's network [2 * dimensions x
-  // n], 0 for the log-stds. The critic's weights are constants.
+  // Sets `d_output` [2 * dimensions x n] to the gradient of the newest Evaluate with respect to the output of
+  // the policy's network. It is 0 for the log-stds. The critic's weights are constants.
   void Gradient(const GaussianHead<Scalar>& pi, TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output) {
     const Eigen::Index n = pi.mean().cols();
     d_q_.setConstant(1, n, Scalar{-1} / static_cast<Scalar>(n));

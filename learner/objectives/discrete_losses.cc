@@ -9,7 +9,7 @@
 namespace dbr {
 namespace {
 
-// Adds -E[min_i sum_a pi Q_i] / scale to the loss and its gradient with respect to pi's probabilities to
+// Adds -E[min_i sum_a pi Q_i] / scale to the loss. Adds its gradient with respect to pi's probabilities to
 // `gradient`.
 template <class Scalar>
 void AddQTerm(const PolicyLossOptions& options, const ValuedPolicy<Scalar>& at,
@@ -36,8 +36,8 @@ void AddQTerm(const PolicyLossOptions& options, const ValuedPolicy<Scalar>& at,
   result->loss -= result->value / scale;
 }
 
-// The mean entropy of the policy; adds the gradient of -weight times it, with respect to pi's probabilities,
-// to `gradient`. The missing +1 of log pi + 1 vanishes in SoftmaxGradient.
+// Returns the mean entropy of the policy. Adds the gradient of -weight times the mean entropy, with respect
+// to pi's probabilities, to `gradient`. The missing +1 of log pi + 1 vanishes in SoftmaxGradient.
 template <class Scalar>
 Scalar AddEntropyTerm(const Categorical<Scalar>& policy, Scalar weight, VectorX<Scalar>* entropy,
                       MatrixX<Scalar>* gradient) {

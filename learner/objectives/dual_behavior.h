@@ -1,5 +1,6 @@
-// What DBR over discrete and over continuous actions have in common: its draws, the options and the figures
-// of its policy loss, and the constraint's threshold. BEAR shares the options: its constraint is FIXED.
+// What DBR over discrete and over continuous actions share: the batches that it needs, the options and the
+// results of its policy loss, and the constraint's threshold. BEAR uses the same options; its constraint is
+// FIXED.
 #pragma once
 
 #include "learner/algorithm.h"
@@ -7,12 +8,13 @@
 
 namespace dbr {
 
-// Whether beta+ is fitted to what did better than V(s), in a step of its own, and not to D+.
+// Whether beta+ is fitted by self-imitation, to transitions that did better than V(s) and in a step of its
+// own, instead of to D+.
 inline bool ImitatesItself(const DbrConfig& config) {
   return config.advantage() == DbrConfig::SIL;
 }
 
-// B from D for the critics and the policy, B+ and B- for the behaviour policies.
+// The batches of one update: B from D for the critics and the policy, B+ and B- for the behaviour policies.
 inline BatchNeeds DualBehaviorNeeds(const AlgorithmConfig& config) {
   const int batch = static_cast<int>(config.batch_size());
   const int behavior =
@@ -50,7 +52,7 @@ struct PolicyLossOptions {
   }
 };
 
-// Of a policy loss with a constraint D(pi, beta) <= c on one behaviour policy.
+// The results of a policy loss with a constraint D(pi, beta) <= c on one behaviour policy.
 template <class Scalar>
 struct ConstrainedLoss {
   Scalar loss = 0;        // the objective with alpha as a constant
@@ -76,8 +78,9 @@ struct Threshold {
   bool moved_by_minus = false;  // c is D(pi, beta-), not eps
 };
 
-// c of D(pi, beta+) <= c for the batch's mean divergence from beta-: max(eps, D-) as the paper prints it, or
-// min(eps, D-), or eps alone (docs/algorithms.md, DBR step 3). Without a constraint 0, which nothing reads.
+// Returns the threshold c of the constraint D(pi, beta+) <= c, given the batch's mean divergence from beta-.
+// c is max(eps, D-), as the paper prints it, or min(eps, D-), or eps alone (docs/algorithms.md, DBR step 3).
+// Without a constraint it is 0 and has no use.
 template <class Scalar>
 Threshold<Scalar> ThresholdOf(DbrConfig::Constraint constraint, Scalar epsilon, Scalar divergence_minus) {
   const bool moved = (constraint == DbrConfig::DYNAMIC_MAX && divergence_minus > epsilon) ||

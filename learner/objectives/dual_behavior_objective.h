@@ -9,7 +9,7 @@
 
 namespace dbr {
 
-// Noise of one evaluation of the loss.
+// The standard normal noise of one evaluation of the loss.
 template <class Scalar>
 struct ObjectiveNoise {
   MatrixX<Scalar> actions;          // [dimensions x samples * n]
@@ -24,19 +24,21 @@ struct PolicyHeads {
   const GaussianHead<Scalar>& beta_minus;
 };
 
-// Workspaces, reused from batch to batch.
+// Computes the loss, with workspaces that are reused from batch to batch. One thread at a time.
 template <class Scalar>
 class DualBehaviorObjective {
  public:
-  // -E[min_i mean_k Q_i(s, a_k)] / scale - w H(pi) + alpha * (D(pi, beta+) - c), a_k drawn from pi, c by
-  // options.constraint (docs/algorithms.md, DBR step 3; NONE leaves that term out), and its gradient with
-  // respect to the output of pi's network [2 * dimensions x n]. beta+, beta-, the critics' weights and the
-  // scale of normalize_q are constants; so is c unless repel_negative. The entropy is that of the draws.
+  // Returns -E[min_i mean_k Q_i(s, a_k)] / scale - w H(pi) + alpha * (D(pi, beta+) - c), with the a_k drawn
+  // from pi. options.constraint sets c (docs/algorithms.md, DBR step 3); NONE leaves that term out. The
+  // entropy H is the estimate from the draws. `d_output` [2 * dimensions x n] becomes the loss's gradient
+  // with respect to the output of pi's network. beta+, beta-, alpha, the critics' weights and normalize_q's
+  // scale are constants. c is a constant too, unless repel_negative is set.
   PolicyLoss<Scalar> Compute(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
                              const MatrixX<Scalar>& observations, const ObjectiveNoise<Scalar>& noise,
                              Scalar alpha, TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output);
 
-  // V(s) [n]: the mean over the draws of the smaller twin.
+  // Sets `value` [n] to V(s): the mean of the smaller twin over the draws of the newest Compute. Requires
+  // that `value` has its size n.
   void StateValue(const TwinCritic<Scalar>& critics, VectorX<Scalar>* value) const {
     MeanOfSmaller<Scalar>(critics.value1(), critics.value2(), value);
   }

@@ -7,7 +7,7 @@
 namespace dbr {
 namespace {
 
-// mean + std * noise, a group of columns of the noise for each state.
+// Sets `samples` to mean + std * noise. Each state has a group of neighbouring columns of the noise.
 template <class Scalar>
 void Spread(const GaussianHead<Scalar>& head, const MatrixX<Scalar>& noise, MatrixX<Scalar>* samples) {
   const Eigen::Index count = noise.cols() / head.mean().cols();

@@ -17,24 +17,24 @@ inline bool IsSampled(DbrConfig::Divergence kind) {
   return kind == DbrConfig::MMD_LAPLACIAN || kind == DbrConfig::MMD_GAUSSIAN;
 }
 
-// Workspaces, reused from batch to batch.
+// Computes the divergence, with workspaces that are reused from batch to batch. One thread at a time.
 template <class Scalar>
 class GaussianDivergence {
  public:
-  // Noise of a sampled divergence, [dimensions x n * samples] each, sample i of state j in column
-  // j * samples + i; empty for an exact one.
+  // The noise of a sampled divergence, [dimensions x n * samples] for each policy. Sample i of state j is
+  // column j * samples + i. Both are empty for an exact divergence.
   struct Noise {
     const MatrixX<Scalar>& pi;
     const MatrixX<Scalar>& beta;
   };
 
-  // value() [n], and gradient(): that of its sum with respect to pi's parameters. Both are of the actions
-  // before the tanh.
+  // Sets value() [n] and gradient(), the gradient of the sum of value() with respect to pi's parameters. Both
+  // are for the actions before the tanh.
   void Compute(const GaussianDivergenceOptions& options, const GaussianHead<Scalar>& pi,
                const GaussianHead<Scalar>& beta, const Noise& noise);
 
-  // The same for a beta that is known by samples alone, [dimensions x n * samples] before the tanh, laid out
-  // as the noise of pi; options.kind is a sampled one.
+  // Does the same for a beta of which only samples are known: [dimensions x n * samples] before the tanh,
+  // laid out as pi's noise. options.kind must be a sampled divergence.
   void ComputeFrom(const GaussianDivergenceOptions& options, const GaussianHead<Scalar>& pi,
                    const MatrixX<Scalar>& pi_noise, const MatrixX<Scalar>& beta_samples);
 

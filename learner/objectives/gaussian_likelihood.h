@@ -1,4 +1,4 @@
-// Fitting a tanh-Gaussian policy to the actions of data by maximum likelihood.
+// Fits a tanh-Gaussian policy to the actions of data by maximum likelihood.
 #pragma once
 
 #include "core/batch.h"
@@ -8,21 +8,23 @@
 
 namespace dbr {
 
-// The policy at the states of its newest use, with workspaces; reused from batch to batch.
+// Holds the policy's head from its newest use and workspaces, which are reused from batch to batch. One
+// thread at a time.
 template <class Scalar>
 class GaussianLikelihood {
  public:
   explicit GaussianLikelihood(const LogStdLimits& limits) : limits_(limits) {}
 
-  // One step on the mean over the batch of -w log p(a|s); weights [n] are constants, null: all 1. Keeps the
-  // loss, and does nothing on an empty batch.
+  // Makes one step of `network` on the mean over the batch of -w log p(a|s). The weights [n] are constants;
+  // null means that all are 1. Keeps the loss. Does nothing on an empty batch.
   void Fit(const BasicBatch<Scalar>& batch, const VectorX<Scalar>* weights, TrainedNetwork<Scalar>* network) {
     if (batch.size() == 0) return;
     Forward(batch.observations, network);
     Step(batch, weights, network);
   }
 
-  // The two halves of Fit, for weights that depend on the policy: its evaluation, and the step from it.
+  // The two halves of Fit, for weights that depend on the policy: Forward evaluates it, and Step makes the
+  // step from there.
   const GaussianHead<Scalar>& Forward(const MatrixX<Scalar>& observations, TrainedNetwork<Scalar>* network) {
     head_.Split(network->Forward(observations), limits_);
     return head_;
@@ -33,17 +35,16 @@ class GaussianLikelihood {
     network->Step(batch.observations, d_output_);
   }
 
-  // Evaluates the policy at `observations`; no gradient is taken.
+  // Evaluates the policy at `observations` without a gradient. The result is valid until the next call.
   const GaussianHead<Scalar>& At(const MatrixX<Scalar>& observations, TrainedNetwork<Scalar>* network) {
     head_.Split(network->Evaluate(observations), limits_);
     return head_;
   }
 
   const GaussianHead<Scalar>& head() const { return head_; }
-  const VectorX<Scalar>& log_prob() const {
-    return log_prob_;
-  }                                      // [n] of the newest Fit, from before its step
-  Scalar loss() const { return loss_; }  // of the newest Fit
+  // [n] The log-likelihood of each action in the newest Step, from before the step.
+  const VectorX<Scalar>& log_prob() const { return log_prob_; }
+  Scalar loss() const { return loss_; }  // the loss of the newest Step
 
  private:
   Scalar Loss(const MatrixX<Scalar>& actions, const VectorX<Scalar>* weights, MatrixX<Scalar>* d_output) {

@@ -1,4 +1,4 @@
-// V'(s') over continuous actions as BEAR and DBR take it.
+// V'(s') over continuous actions, as BEAR and DBR compute it.
 #pragma once
 
 #include "learner/objectives/continuous_losses.h"
@@ -8,12 +8,13 @@
 
 namespace dbr {
 
-// Workspaces, reused from batch to batch.
+// Computes V'(s'), with workspaces that are reused from batch to batch. One thread at a time.
 template <class Scalar>
 class GreatestTarget {
  public:
-  // [n] the greatest over draws of pi', the policy's target, of min_weight * min_i Q'_i + (1 - min_weight) *
-  // max_i Q'_i. noise [dimensions x count * n]. No gradient is taken.
+  // Returns V'(s') [n]: the greatest value of min_weight * min_i Q'_i + (1 - min_weight) * max_i Q'_i over
+  // draws from pi', the target of `policy` (Kumar et al. 2019, algorithm 1). noise [dimensions x count * n].
+  // No gradient is taken.
   const VectorX<Scalar>& Compute(const MatrixX<Scalar>& next_observations, const MatrixX<Scalar>& noise,
                                  Scalar min_weight, TrainedNetwork<Scalar>* policy,
                                  TwinCritic<Scalar>* critics) {

@@ -5,8 +5,8 @@
 
 namespace dbr {
 
-// [n] what rewards are raised by: weight * log beta+(a|s), the log clipped to [-1, 0]. Of the DBR paper's
-// section on ablations, which puts log beta+ in the place of the log-policy.
+// Sets `bonus` [n] to weight * log beta+(a|s), with the log clipped to [-1, 0]. The rewards are raised by it.
+// The DBR paper's section on ablations puts log beta+ in the place of the log-policy.
 template <class Scalar>
 void MunchausenBonus(double weight, const VectorX<Scalar>& log_prob, VectorX<Scalar>* bonus) {
   *bonus = static_cast<Scalar>(weight) * log_prob.cwiseMax(Scalar{-1}).cwiseMin(Scalar{0});

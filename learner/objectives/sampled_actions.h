@@ -1,4 +1,5 @@
-// Draws from a tanh-Gaussian policy at every state of a batch, and the way back through them.
+// Draws actions from a tanh-Gaussian policy at every state of a batch, and takes gradients back through the
+// draws.
 #pragma once
 
 #include "core/batch.h"
@@ -8,23 +9,24 @@
 
 namespace dbr {
 
-// Standard normal noise, for a loss to take as an argument.
+// Fills `noise` [rows x cols] with standard normal noise, which a loss takes as an argument.
 template <class Scalar>
 void FillNormal(Rng& rng, Eigen::Index rows, Eigen::Index cols, MatrixX<Scalar>* noise) {
   noise->resize(rows, cols);
   for (Eigen::Index i = 0; i < noise->size(); ++i) noise->data()[i] = static_cast<Scalar>(rng.Normal());
 }
 
-// `count` draws of each of n states: draw k of state j is column k * n + j. Reused from batch to batch.
+// `count` draws for each of n states: draw k of state j is column k * n + j. Reused from batch to batch. One
+// thread at a time.
 template <class Scalar>
 class SampledActions {
  public:
-  // noise [dimensions x count * n].
+  // Draws actions with their log-probabilities. noise [dimensions x count * n].
   void Draw(const GaussianHead<Scalar>& head, const MatrixX<Scalar>& noise) {
     Repeat(head, noise);
     SampleTanhGaussian<Scalar>({mean_, log_std_}, noise_, &sample_);
   }
-  // Without log-probabilities, and so without a way back.
+  // Draws actions without log-probabilities.
   void DrawActions(const GaussianHead<Scalar>& head, const MatrixX<Scalar>& noise) {
     Repeat(head, noise);
     SampleTanhActions<Scalar>({mean_, log_std_}, noise_, &sample_);
@@ -33,7 +35,7 @@ class SampledActions {
   Eigen::Index count() const { return count_; }
   const TanhSample<Scalar>& sample() const { return sample_; }
 
-  // [observation + dimensions x count * n]: what a critic takes.
+  // Returns the critics' input [observation + dimensions x count * n]: the observations above the actions.
   const MatrixX<Scalar>& CriticInput(const MatrixX<Scalar>& observations) {
     input_.resize(observations.rows() + sample_.action.rows(), count_ * n_);
     for (Eigen::Index k = 0; k < count_; ++k) {
@@ -43,8 +45,8 @@ class SampledActions {
     return input_;
   }
 
-  // Adds to `gradient` [dimensions x n] what flows back from gradients with respect to the critic's input (as
-  // CriticInput made it) and to the log-probabilities [count * n].
+  // Adds to `gradient` [dimensions x n] the gradient that flows back from the critic's input (as CriticInput
+  // made it) and from the log-probabilities [count * n].
   void Backprop(const MatrixX<Scalar>& d_input, const VectorX<Scalar>& d_log_prob,
                 GaussianGradient<Scalar>* gradient) {
     BackpropTanhSample<Scalar>({mean_, log_std_}, noise_, sample_,

@@ -1,4 +1,4 @@
-// The part of a policy's loss over continuous actions that looks at Q and at the entropy, with its gradient.
+// The Q term and the entropy term of a policy's loss over continuous actions, with their gradient.
 #pragma once
 
 #include "learner/objectives/continuous_losses.h"
@@ -14,7 +14,7 @@ struct SampledQOptions {
   Scalar entropy_weight = 0;
 };
 
-// pi at n states, and the noise of `count` draws of each.
+// The policy at n states, and the noise of `count` draws for each state.
 template <class Scalar>
 struct PolicyDraws {
   const GaussianHead<Scalar>& pi;
@@ -22,13 +22,13 @@ struct PolicyDraws {
   const MatrixX<Scalar>& noise;         // [dimensions x count * n], draw k of state j in column k * n + j
 };
 
-// Workspaces, reused from batch to batch.
+// Computes the loss, with workspaces that are reused from batch to batch. One thread at a time.
 template <class Scalar>
 class SampledQObjective {
  public:
-  // -E[min_i mean_k Q_i(s, a_k)] / scale - entropy_weight * H(pi), the a_k drawn from pi and the entropy that
-  // of the draws, and its gradient with respect to pi's parameters, which is overwritten. The critics'
-  // weights, the entropy's and the scale (SmallerMeanQTerm) are constants.
+  // Returns -E[min_i mean_k Q_i(s, a_k)] / scale - entropy_weight * H(pi), with the a_k drawn from pi and the
+  // entropy H estimated from the draws. Overwrites `gradient` with the gradient with respect to pi's
+  // parameters. The critics' weights, entropy_weight and the scale (SmallerMeanQTerm) are constants.
   SoftPolicyLoss<Scalar> Compute(const SampledQOptions<Scalar>& options, const PolicyDraws<Scalar>& at,
                                  TwinCritic<Scalar>* critics, GaussianGradient<Scalar>* gradient) {
     const Eigen::Index n = at.observations.cols();

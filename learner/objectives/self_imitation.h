@@ -6,12 +6,14 @@
 
 namespace dbr {
 
-// Judges a batch by what its episodes really earned. Reused from batch to batch.
+// Computes advantages from the returns that the batch's episodes earned. Reused from batch to batch. One
+// thread at a time.
 template <class Scalar>
 class SelfImitation {
  public:
-  // A = reward_scale * R - V(s) of each transition, R its Monte-Carlo return, `value` [n] V(s), a constant;
-  // and the weights max(A, 0) / mean of max(A, 0), so that their mean is 1 whatever the rewards' size.
+  // Sets advantage() to A = reward_scale * R - V(s) for each transition. R is its Monte-Carlo return, and
+  // `value` [n] is V(s), a constant. Sets weights() to max(A, 0) / mean of max(A, 0), so that their mean is 1
+  // at any size of the rewards. Requires a batch with returns.
   void Judge(const BasicBatch<Scalar>& batch, double reward_scale, const VectorX<Scalar>& value) {
     DBR_CHECK(batch.returns.size() == batch.size());
     advantage_ = static_cast<Scalar>(reward_scale) * batch.returns - value;
@@ -22,7 +24,7 @@ class SelfImitation {
   }
 
   const VectorX<Scalar>& advantage() const { return advantage_; }  // [n]
-  // False where no transition did better than V(s): there is nothing to imitate and weights() are all 0.
+  // False where no transition did better than V(s). There is then nothing to imitate and all weights() are 0.
   bool imitates() const { return imitates_; }
   const VectorX<Scalar>& weights() const { return weights_; }  // [n]
 

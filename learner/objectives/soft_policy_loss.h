@@ -1,4 +1,4 @@
-// The figures of SAC's policy loss, whatever the actions.
+// The results of SAC's policy loss, over either kind of action.
 #pragma once
 
 namespace dbr {
@@ -7,7 +7,7 @@ template <class Scalar>
 struct SoftPolicyLoss {
   Scalar loss = 0;
   Scalar value = 0;    // E[min_i Q_i(s, a)]
-  Scalar entropy = 0;  // mean of -log pi(a|s), nats: exact over discrete actions, else over the draws
+  Scalar entropy = 0;  // mean of -log pi(a|s), nats: exact over discrete actions, else estimated from draws
 };
 
 }  // namespace dbr

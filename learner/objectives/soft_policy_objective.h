@@ -7,13 +7,13 @@
 
 namespace dbr {
 
-// Workspaces, reused from batch to batch.
+// Computes the loss, with workspaces that are reused from batch to batch. One thread at a time.
 template <class Scalar>
 class SoftPolicyObjective {
  public:
-  // E[temperature * log pi(a|s) - min_i Q_i(s, a)], one a drawn from pi for each state by noise [dimensions x
-  // n] (Haarnoja et al. 2018, equation 9), and its gradient with respect to the output of pi's network [2 *
-  // dimensions x n]. The critics' weights and the temperature are constants.
+  // Returns E[temperature * log pi(a|s) - min_i Q_i(s, a)] with one a drawn from pi for each state (Haarnoja
+  // et al. 2018, equation 9). noise [dimensions x n]. `d_output` [2 * dimensions x n] becomes the gradient
+  // with respect to the output of pi's network. The critics' weights and the temperature are constants.
   SoftPolicyLoss<Scalar> Compute(const GaussianHead<Scalar>& pi, const MatrixX<Scalar>& observations,
                                  const MatrixX<Scalar>& noise, Scalar temperature,
                                  TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output) {
