@@ -1,5 +1,6 @@
-// What every actor-critic trains and keeps, whatever its losses: policy, twin critics, random generator,
-// counter, and the advantages of its newest update. Algorithms hold one of these, or one that adds networks.
+// What every actor-critic trains and keeps, with any loss: a policy, twin critics, a random generator, a
+// counter, and the advantages of the newest update. An algorithm holds one of these, or a struct that derives
+// from it and adds networks.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,7 @@
 
 namespace dbr {
 
-// One thread at a time, but for what runs on `runner`.
+// The algorithm owns it. One thread at a time, except for functions that `runner` runs side by side.
 template <class Scalar>
 struct ActorCritic {
   ActorCritic(const AlgorithmSpec& algorithm_spec, bool policy_target)
@@ -29,10 +30,10 @@ struct ActorCritic {
         policy(PolicyShape(PolicySpecOf(spec)), spec.config.learning_rate(), policy_target, rng),
         critics(CriticShape(PolicySpecOf(spec)), spec.config.learning_rate(), rng, &runner) {}
 
-  // All of a batch is drawn from D.
+  // Every transition of the batch is drawn from D.
   BatchNeeds needs() const { return {.uniform = static_cast<int>(spec.config.batch_size())}; }
 
-  // Sets the learning rate of this update, and gives it for networks that are not here.
+  // Sets the learning rate of this update. Returns it, for networks that are not in this struct.
   double Begin() {
     const double learning_rate = LearningRate(spec.config, updates);
     policy.set_learning_rate(learning_rate);
@@ -40,20 +41,20 @@ struct ActorCritic {
     return learning_rate;
   }
 
-  // `advantage`, of each transition of the uniform batch [n], an expression of Eigen's.
+  // Stores the advantage of each transition of the uniform batch [n]. `advantage` is an Eigen expression.
   template <class Vector>
   void SetAdvantages(const Eigen::MatrixBase<Vector>& advantage) {
     advantages.resize(static_cast<std::size_t>(advantage.size()));
     Eigen::Map<Eigen::VectorXf>(advantages.data(), advantage.size()) = advantage.template cast<float>();
   }
 
-  // Polyak averaging of the critics' targets, and of the policy's where it has one.
+  // Polyak averages the critics' targets, and the policy's target where it has one.
   void UpdateTargets() {
     critics.UpdateTargets(spec.config.target_tau());
     policy.UpdateTarget(spec.config.target_tau());
   }
 
-  // Begins a snapshot with the three networks; an algorithm adds those of its own.
+  // Starts a snapshot with the policy and the two critics. An algorithm then adds its own networks.
   void Export(PolicySnapshot* snapshot) const {
     BeginExport(spec, snapshot);
     ExportNetwork(kPolicyNetwork, policy.parameters(), snapshot);
@@ -67,7 +68,8 @@ struct ActorCritic {
     PutRng(AlgorithmName(spec.config) + ".rng", rng, file);
     PutCounter(AlgorithmName(spec.config) + ".updates", updates, file);
   }
-  // Errors as TrainedNetwork::Load's.
+  // Returns DataLoss where a tensor or counter is missing and InvalidArgument where a tensor has another
+  // size.
   absl::Status Load(const TensorFile& file) {
     absl::Status status = policy.Load(kPolicyNetwork, file);
     status.Update(critics.Load(file));
@@ -82,7 +84,7 @@ struct ActorCritic {
   TrainedNetwork<Scalar> policy;
   TwinCritic<Scalar> critics;
   std::uint64_t updates = 0;
-  std::vector<float> advantages;  // of the newest update's uniform batch
+  std::vector<float> advantages;  // [n] for the newest update's uniform batch
 };
 
 }  // namespace dbr

@@ -1,4 +1,4 @@
-// BEAR's behaviour model over continuous actions: a conditional VAE with what training it needs.
+// BEAR's behaviour model over continuous actions: a conditional VAE with its optimizers.
 #pragma once
 
 #include <vector>
@@ -10,7 +10,7 @@
 
 namespace dbr {
 
-// One thread at a time.
+// Owns the encoder and the decoder. One thread at a time.
 template <class Scalar>
 class BehaviorVae {
  public:
@@ -21,7 +21,7 @@ class BehaviorVae {
 
   const CvaeShape& shape() const { return cvae_.shape(); }
 
-  // One step of both networks on the VAE's loss (nn/cvae.h), which is given as it was before the step.
+  // Makes one step of both networks on the VAE's loss (nn/cvae.h). Returns the loss from before the step.
   CvaeLoss<Scalar> Fit(const CvaeBatch<Scalar>& batch, Scalar kl_weight) {
     const CvaeLoss<Scalar> loss = cvae_.Gradient({encoder_.parameters(), decoder_.parameters()}, batch,
                                                  kl_weight, &encoder_.gradient(), &decoder_.gradient());
@@ -30,9 +30,9 @@ class BehaviorVae {
     return loss;
   }
 
-  // [dimensions x n * count] actions before their tanh at n observations: sample i of state s is column
-  // s * count + i. noise [latent x n * count] is standard normal; its entries are clipped to +-limit, which
-  // keeps the latents where the decoder has seen data.
+  // Returns actions before their tanh at n observations [dimensions x n * count]. Sample i of state s is
+  // column s * count + i. noise [latent x n * count] is standard normal. Its entries are clipped to +-limit,
+  // which keeps the latents where the decoder has seen data. The result is valid until the next call.
   const MatrixX<Scalar>& Sample(const MatrixX<Scalar>& observations, const MatrixX<Scalar>& noise,
                                 Scalar limit) {
     latents_ = noise.cwiseMax(-limit).cwiseMin(limit);

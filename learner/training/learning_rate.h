@@ -7,8 +7,9 @@
 
 namespace dbr {
 
-// The rate of update number `updates` (from 0): learning_rate, falling linearly to final_learning_rate over
-// learning_rate_decay_updates where that is set.
+// Returns the learning rate of update number `updates` (from 0). It falls linearly from learning_rate to
+// final_learning_rate over learning_rate_decay_updates updates and then stays there. With 0 decay updates it
+// is constant.
 inline double LearningRate(const AlgorithmConfig& config, std::uint64_t updates) {
   const std::uint64_t span = config.learning_rate_decay_updates();
   if (span == 0) return config.learning_rate();

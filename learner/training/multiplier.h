@@ -1,5 +1,5 @@
-// The Lagrange multiplier of a constraint: of DBR's on a divergence, of SAC's on the entropy (its
-// temperature).
+// The Lagrange multiplier of a constraint: DBR's and BEAR's constraints on a divergence, and SAC's on the
+// entropy (its temperature).
 #pragma once
 
 #include <algorithm>
@@ -12,11 +12,12 @@
 namespace dbr {
 
 struct MultiplierLimits {
-  double min_log = -5;  // as BEAR's
+  double min_log = -5;  // as in BEAR's code
   double max_log = 10;
 };
 
-// alpha = exp(log_alpha); gradient ascent on alpha * violation by Adam.
+// The multiplier alpha = exp(log_alpha). Adam makes gradient ascent on alpha * violation. One thread at a
+// time.
 template <class Scalar>
 class Multiplier {
  public:
@@ -28,7 +29,8 @@ class Multiplier {
 
   Scalar value() const { return std::exp(log_alpha_[0]); }
 
-  // One step; where `violation` (of a divergence: D - c) is above 0 the multiplier grows.
+  // Makes one step. The multiplier grows where `violation` is above 0 (for a divergence, violation = D - c)
+  // and falls where it is below 0.
   void Step(Scalar violation) {
     gradient_[0] = -value() * violation;
     adam_.Step(gradient_, &log_alpha_);

@@ -1,4 +1,4 @@
-// Two independent pieces of an update side by side.
+// Runs two independent pieces of an update side by side.
 #pragma once
 
 #include <memory>
@@ -10,15 +10,15 @@
 
 namespace dbr {
 
-// Threads of an update: the config's, or where that is 0 two on a machine of four cores or more, whose actors
-// leave room for the second one.
+// The number of threads of an update. The config sets it. Where the config says 0, it is 2 on a machine with
+// four cores or more, because the actors there leave a core free, else 1.
 inline int UpdateThreads(const AlgorithmConfig& config) {
   if (config.threads() > 0) return static_cast<int>(config.threads());
   return std::thread::hardware_concurrency() >= 4 ? 2 : 1;
 }
 
-// Runs pairs of functions, the second one on a thread of its own where there are two threads. The results do
-// not depend on the number of threads. One caller at a time; allocates nothing in Run.
+// Runs pairs of functions. With two threads the second function runs on a thread that the runner owns. The
+// results do not depend on the number of threads. One caller at a time. Run allocates nothing.
 class PairRunner {
  public:
   explicit PairRunner(int threads) {
@@ -35,7 +35,7 @@ class PairRunner {
   PairRunner(const PairRunner&) = delete;
   PairRunner& operator=(const PairRunner&) = delete;
 
-  // Returns when both have. They must not touch the same data.
+  // Blocks until both functions have returned. They must not touch the same data.
   template <class First, class Second>
   void Run(const First& first, const Second& second) {
     if (!thread_.joinable()) {

@@ -1,4 +1,4 @@
-// Filling a policy's snapshot from an algorithm's networks.
+// Fills a policy's snapshot from an algorithm's networks.
 #pragma once
 
 #include <vector>
@@ -15,12 +15,13 @@ inline PolicySpec PolicySpecOf(const AlgorithmSpec& spec) {
           .hidden_sizes = spec.hidden_sizes};
 }
 
-// The spec; no networks yet.
+// Sets the snapshot's spec and removes its networks.
 inline void BeginExport(const AlgorithmSpec& spec, PolicySnapshot* snapshot) {
   snapshot->spec = PolicySpecOf(spec);
   snapshot->networks.clear();
 }
 
+// Adds a network's parameters to the snapshot, in single precision.
 template <class Scalar>
 void ExportNetwork(const char* name, const VectorX<Scalar>& parameters, PolicySnapshot* snapshot) {
   snapshot->networks.emplace_back(name, std::vector<float>(parameters.begin(), parameters.end()));

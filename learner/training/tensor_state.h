@@ -1,4 +1,4 @@
-// Putting an algorithm's state into a checkpoint and taking it out again.
+// Puts an algorithm's state into a checkpoint and reads it back.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +13,7 @@
 
 namespace dbr {
 
+// Stores `values` as a tensor in single precision.
 template <class Scalar>
 void PutTensor(const std::string& name, const VectorX<Scalar>& values, TensorFile* file) {
   std::vector<float>& out = file->tensors[name];
@@ -21,8 +22,8 @@ void PutTensor(const std::string& name, const VectorX<Scalar>& values, TensorFil
     out[static_cast<std::size_t>(i)] = static_cast<float>(values[i]);
 }
 
-// `values` has the expected size. DataLoss where the tensor is missing, InvalidArgument where its size
-// differs.
+// Reads a tensor into `values`, which must have the expected size. Returns DataLoss where the tensor is
+// missing and InvalidArgument where its size differs.
 template <class Scalar>
 absl::Status GetTensor(const std::string& name, const TensorFile& file, VectorX<Scalar>* values) {
   const auto found = file.tensors.find(name);
@@ -42,7 +43,7 @@ inline void PutCounter(const std::string& name, std::uint64_t value, TensorFile*
   file->metadata[name] = absl::StrCat(value);
 }
 
-// DataLoss where the counter is missing or not a number.
+// Returns DataLoss where the counter is missing or is not a number.
 inline absl::Status GetCounter(const std::string& name, const TensorFile& file, std::uint64_t* value) {
   const auto found = file.metadata.find(name);
   if (found == file.metadata.end() || !absl::SimpleAtoi(found->second, value)) {
@@ -51,12 +52,13 @@ inline absl::Status GetCounter(const std::string& name, const TensorFile& file, 
   return absl::OkStatus();
 }
 
-// The state of a random generator, as four counters.
+// Stores the state of a random generator as four counters.
 inline void PutRng(const std::string& name, const Rng& rng, TensorFile* file) {
   for (std::size_t i = 0; i < rng.state().size(); ++i) {
     PutCounter(absl::StrCat(name, ".", i), rng.state()[i], file);
   }
 }
+// Reads it back. Returns the errors of GetCounter.
 inline absl::Status GetRng(const std::string& name, const TensorFile& file, Rng* rng) {
   Rng::State state;
   absl::Status status;

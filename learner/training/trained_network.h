@@ -1,4 +1,5 @@
-// A network with what training it needs: parameters, optimizer, gradient, and where asked a Polyak target.
+// A network with everything that its training needs: parameters, an optimizer, a gradient and, where asked, a
+// Polyak target.
 #pragma once
 
 #include <string>
@@ -12,7 +13,7 @@
 
 namespace dbr {
 
-// Plain value; one thread at a time.
+// Owns its parameters. It can be copied. One thread at a time.
 template <class Scalar>
 class TrainedNetwork {
  public:
@@ -29,46 +30,50 @@ class TrainedNetwork {
   const VectorX<Scalar>& parameters() const { return parameters_; }
   const VectorX<Scalar>& target() const { return target_; }
   const VectorX<Scalar>& gradient() const { return gradient_; }
-  // For a caller that computes the gradient itself and then steps by ApplyGradient.
+  // For a caller that computes the gradient itself and then calls ApplyGradient.
   VectorX<Scalar>& gradient() { return gradient_; }
 
-  // [output x n] of the online network; keeps what Step needs.
+  // Returns the online network's output [output x n] and keeps what Step needs. The results of this and the
+  // next three functions are valid until the next call that uses the same workspace.
   const MatrixX<Scalar>& Forward(const ConstMatrixRef<Scalar>& x) {
     return MlpForward(shape_, parameters_.data(), x, &activations_);
   }
-  // [output x n] of the online network where no gradient is asked for; leaves what Forward keeps alone.
+  // Returns the online network's output [output x n] without keeping anything for a gradient. What Forward
+  // kept stays valid. Evaluate and ForwardTarget share a workspace.
   const MatrixX<Scalar>& Evaluate(const ConstMatrixRef<Scalar>& x) {
     return MlpForward(shape_, parameters_.data(), x, &target_activations_);
   }
-  // [output x n] of the target network; no gradient is taken through it.
+  // Returns the target network's output [output x n]. No gradient can be taken through it. Requires a target.
   const MatrixX<Scalar>& ForwardTarget(const ConstMatrixRef<Scalar>& x) {
     return MlpForward(shape_, target_.data(), x, &target_activations_);
   }
-  // [output x n] of the online network for InputGradient; leaves what Forward keeps alone.
+  // Returns the online network's output [output x n] and keeps what InputGradient needs. What Forward kept
+  // stays valid.
   const MatrixX<Scalar>& ForwardForInput(const ConstMatrixRef<Scalar>& x) {
     return MlpForward(shape_, parameters_.data(), x, &input_activations_);
   }
-  // The gradient with respect to the x [input x n] of the newest ForwardForInput.
+  // Computes the gradient with respect to the x [input x n] of the newest ForwardForInput.
   void InputGradient(const ConstMatrixRef<Scalar>& d_output, MatrixX<Scalar>* d_x) {
     MlpInputGradient(shape_, parameters_.data(), d_output, &input_activations_, d_x);
   }
-  // The gradient for the newest Forward(x) from the loss's gradient with respect to its output.
+  // Computes gradient() for the newest Forward(x) from the gradient of the loss with respect to its output
+  // [output x n].
   void ComputeGradient(const ConstMatrixRef<Scalar>& x, const ConstMatrixRef<Scalar>& d_output) {
     MlpParameterGradient(shape_, parameters_.data(), x, d_output, &activations_, &gradient_);
   }
-  // ComputeGradient, then one Adam step.
+  // Calls ComputeGradient and makes one Adam step.
   void Step(const ConstMatrixRef<Scalar>& x, const ConstMatrixRef<Scalar>& d_output) {
     ComputeGradient(x, d_output);
     ApplyGradient();
   }
-  // One Adam step on gradient().
+  // Makes one Adam step on gradient().
   void ApplyGradient() { adam_.Step(gradient_, &parameters_); }
   void set_learning_rate(double learning_rate) { adam_.set_learning_rate(learning_rate); }
-  // Lets the target, where there is one, start again from the online network.
+  // Copies the online network into the target, where there is one.
   void ResetTarget() {
     if (target_.size() > 0) target_ = parameters_;
   }
-  // Polyak averaging of the target, where there is one.
+  // Polyak averages the target, where there is one: target += tau * (online - target).
   void UpdateTarget(double tau) {
     if (target_.size() > 0) PolyakUpdate(parameters_, static_cast<Scalar>(tau), &target_);
   }
@@ -78,6 +83,8 @@ class TrainedNetwork {
     self.Visit(name, [&](const std::string& key, VectorX<Scalar>& values) { PutTensor(key, values, file); });
     PutCounter(name + ".adam.steps", adam_.steps(), file);
   }
+  // Returns DataLoss where a tensor or counter is missing and InvalidArgument where a tensor has another
+  // size.
   absl::Status Load(const std::string& name, const TensorFile& file) {
     absl::Status status;
     Visit(name, [&](const std::string& key, VectorX<Scalar>& values) {

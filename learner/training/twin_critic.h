@@ -1,4 +1,4 @@
-// Two critics with Polyak targets, each on a thread of its own where the runner has two.
+// Two critics with Polyak targets. Where the runner has two threads, each critic runs on one of them.
 #pragma once
 
 #include <string>
@@ -10,18 +10,18 @@
 
 namespace dbr {
 
-// What a critic says is [outputs x n]: a value for each action, or one value where the action is part of the
-// input x [input x n]. One thread at a time.
+// Owns both critics. A critic's output is [outputs x n]: a value for each action, or one value where the
+// action is part of the input x [input x n]. One thread at a time.
 template <class Scalar>
 class TwinCritic {
  public:
-  // `runner` outlives the critics.
+  // `runner` must outlive the critics.
   TwinCritic(const MlpShape& shape, double learning_rate, Rng& rng, PairRunner* runner)
       : runner_(runner),
         first_{TrainedNetwork<Scalar>(shape, learning_rate, /*with_target=*/true, rng), {}, {}, {}, 0},
         second_{TrainedNetwork<Scalar>(shape, learning_rate, /*with_target=*/true, rng), {}, {}, {}, 0} {}
 
-  // Evaluates the targets; their values are target1(), target2() until the next call.
+  // Evaluates the targets. Their values are target1() and target2() until the next call.
   void EvaluateTargets(const ConstMatrixRef<Scalar>& x) {
     runner_->Run([&] { first_.target = &first_.network.ForwardTarget(x); },
                  [&] { second_.target = &second_.network.ForwardTarget(x); });
@@ -29,9 +29,9 @@ class TwinCritic {
   const MatrixX<Scalar>& target1() const { return *first_.target; }
   const MatrixX<Scalar>& target2() const { return *second_.target; }
 
-  // One step of both on loss(q, &d_q), which gives a critic's loss and its gradient with respect to q
-  // [outputs x n] and may run on two threads at once. Keeps the values from before the step in q1(), q2().
-  // The two losses' mean.
+  // Makes one step of both critics on loss(q, &d_q). `loss` returns a critic's loss and sets its gradient
+  // with respect to q [outputs x n]; it may run on two threads at once. q1() and q2() keep the values from
+  // before the step. Returns the mean of the two losses.
   template <class Loss>
   Scalar Fit(const ConstMatrixRef<Scalar>& x, const Loss& loss) {
     const auto fit = [&](Critic* critic) {
@@ -45,14 +45,15 @@ class TwinCritic {
   const MatrixX<Scalar>& q1() const { return first_.q; }
   const MatrixX<Scalar>& q2() const { return second_.q; }
 
-  // Evaluates the critics as they are; their values are value1(), value2() until the next call.
+  // Evaluates the online critics. Their values are value1() and value2() until the next call.
   void Evaluate(const ConstMatrixRef<Scalar>& x) {
     runner_->Run([&] { first_.value = &first_.network.ForwardForInput(x); },
                  [&] { second_.value = &second_.network.ForwardForInput(x); });
   }
   const MatrixX<Scalar>& value1() const { return *first_.value; }
   const MatrixX<Scalar>& value2() const { return *second_.value; }
-  // The gradient of sum(d_q1 .* q1 + d_q2 .* q2) with respect to the x [input x n] of the newest Evaluate.
+  // Returns the gradient of sum(d_q1 .* q1 + d_q2 .* q2) with respect to the x [input x n] of the newest
+  // Evaluate.
   const MatrixX<Scalar>& InputGradient(const ConstMatrixRef<Scalar>& d_q1,
                                        const ConstMatrixRef<Scalar>& d_q2) {
     runner_->Run([&] { first_.network.InputGradient(d_q1, &first_.d_x); },
@@ -60,7 +61,7 @@ class TwinCritic {
     first_.d_x += second_.d_x;
     return first_.d_x;
   }
-  // The gradient of sum(d_q1 .* q1) alone.
+  // Returns the gradient of sum(d_q1 .* q1) alone.
   const MatrixX<Scalar>& FirstInputGradient(const ConstMatrixRef<Scalar>& d_q1) {
     first_.network.InputGradient(d_q1, &first_.d_x);
     return first_.d_x;
@@ -86,25 +87,26 @@ class TwinCritic {
     return status;
   }
 
-  // Useful operations for n samples.
-  double TargetFlops(Eigen::Index n) const { return 2 * shape().ForwardFlops(n); }  // or of Evaluate
+  // Useful floating-point operations for n samples. TargetFlops counts EvaluateTargets or Evaluate.
+  double TargetFlops(Eigen::Index n) const { return 2 * shape().ForwardFlops(n); }
   double FitFlops(Eigen::Index n) const {
     return 2 * (shape().ForwardFlops(n) + shape().ParameterGradientFlops(n));
   }
-  // Of Evaluate and InputGradient, where each sample's gradient goes through one of the two.
+  // The operations of Evaluate and InputGradient, where each sample's gradient goes through one of the two
+  // critics.
   double InputGradientFlops(Eigen::Index n) const { return 3 * shape().ForwardFlops(n); }
-  // Of FirstInputGradient, without Evaluate.
+  // The operations of FirstInputGradient, without Evaluate.
   double FirstInputGradientFlops(Eigen::Index n) const { return shape().ForwardFlops(n); }
 
  private:
   struct Critic {
     TrainedNetwork<Scalar> network;
-    MatrixX<Scalar> q;    // [outputs x n] of the newest Fit, from before its step
+    MatrixX<Scalar> q;    // [outputs x n], kept by the newest Fit from before its step
     MatrixX<Scalar> d_q;  // [outputs x n]
     MatrixX<Scalar> d_x;  // [input x n]
     Scalar loss;
-    const MatrixX<Scalar>* target = nullptr;  // [outputs x n] of the newest EvaluateTargets
-    const MatrixX<Scalar>* value = nullptr;   // [outputs x n] of the newest Evaluate
+    const MatrixX<Scalar>* target = nullptr;  // [outputs x n], set by EvaluateTargets
+    const MatrixX<Scalar>* value = nullptr;   // [outputs x n], set by Evaluate
   };
 
   const MlpShape& shape() const { return first_.network.shape(); }

@@ -1,4 +1,4 @@
-// The figures of an update, and the one check that they are finite.
+// The metrics of an update, and the one check that they are finite.
 #pragma once
 
 #include <cmath>
@@ -13,7 +13,8 @@
 
 namespace dbr {
 
-// Sets `metrics` to `values`, in order. Internal, naming the first that is not finite.
+// Sets `metrics` to `values`, in order. Returns Internal, naming the first value that is not finite. Requires
+// as many values as metrics.
 inline absl::Status SetMetrics(absl::Span<const double> values, std::uint64_t updates,
                                std::vector<UpdateMetric>* metrics) {
   DBR_CHECK(values.size() == metrics->size());
@@ -30,7 +31,7 @@ inline absl::Status SetMetrics(absl::Span<const double> values, std::uint64_t up
 
 struct AdvantageFigures {
   double mean = 0;
-  double positive = 0;  // share at or above 0
+  double positive = 0;  // the share of advantages at or above 0
   double deviation = 0;
 };
 
