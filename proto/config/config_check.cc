@@ -35,7 +35,8 @@ bool Within(double value, const Bounds& bounds) {
   return !bounds.has_max() || (value <= bounds.max() && !(bounds.exclusive_max() && value == bounds.max()));
 }
 
-// The number in a field, or in entry `i` of a repeated one; whole numbers as the nearest double.
+// Returns the number in a field, or in entry `i` of a repeated one. Whole numbers are rounded to the nearest
+// double.
 double NumberIn(const Message& message, const FieldDescriptor& field, int i) {
   const Reflection& reflection = *message.GetReflection();
   const bool repeated = field.is_repeated();
@@ -114,7 +115,7 @@ void FindViolations(const Message& message, const std::string& path, std::vector
       FindViolations(reflection.GetRepeatedMessage(message, &field, entry),
                      absl::StrCat(field_path, "[", entry, "]"), errors);
     }
-    // What is not there has the schema's defaults, which are within their bounds.
+    // A message that is not set has the schema's defaults, which are within their bounds.
     if (!field.is_repeated() && reflection.HasField(message, &field)) {
       FindViolations(reflection.GetMessage(message, &field), field_path, errors);
     }

@@ -1,5 +1,5 @@
-// Checking a config against the (bounds) and (required_text) options of its schema. For the readers in this
-// room.
+// Checks a config against the (bounds) and (required_text) options of its schema. Only the readers in this
+// folder use it.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -12,13 +12,14 @@
 
 namespace dbr {
 
-// Appends to `errors` one line for each violation in `message` and the messages within it: "a.b: expected 0
-// to 1, found 2". Numbers must be finite, bounds or not. `path` names `message` within the whole ("" or
-// "a.b").
+// Appends to `errors` one line for each violation in `message` and in the messages within it: "a.b: expected
+// 0 to 1, found 2". Numbers must be finite, with or without bounds. `path` names `message` within the whole
+// ("" or "a.b"). O(fields that are set).
 void FindViolations(const google::protobuf::Message& message, const std::string& path,
                     std::vector<std::string>* errors);
 
-// InvalidArgument with all of the errors, a line each: "SOURCE: 2 errors:\n  ..."; OK where there is none.
+// Returns InvalidArgument with all of the errors, one on a line: "SOURCE: 2 errors:\n ...". Returns OK where
+// there is none.
 absl::Status AllErrors(const std::vector<std::string>& errors, absl::string_view source);
 
 }  // namespace dbr

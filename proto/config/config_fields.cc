@@ -23,7 +23,7 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using google::protobuf::Reflection;
 
-// Levenshtein's distance: inserted, removed and replaced characters. O(|a| |b|).
+// Returns Levenshtein's distance: the number of inserted, removed and replaced characters. O(|a| |b|).
 std::size_t EditDistance(absl::string_view a, absl::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
@@ -43,7 +43,7 @@ std::string Expected(absl::string_view what, absl::string_view found) {
   return absl::StrCat("expected ", what, ", found '", found, "'");
 }
 
-// Decimal, 0x hexadecimal or 0 octal digits, as the text format reads them; nothing else.
+// Parses decimal, 0x hexadecimal or 0 octal digits, as the text format does, and nothing else.
 std::optional<std::uint64_t> ParseDigits(const std::string& text) {
   if (text.empty() || !absl::ascii_isdigit(static_cast<unsigned char>(text[0]))) return std::nullopt;
   errno = 0;
@@ -63,7 +63,7 @@ std::optional<Integer> ParseWhole(absl::string_view text) {
     return *digits <= static_cast<std::uint64_t>(Limits::max()) ? std::optional<Integer>(*digits)
                                                                 : std::nullopt;
   const std::uint64_t most =
-      ~static_cast<std::uint64_t>(Limits::min()) + 1;  // |min|; 0 where there is no sign
+      ~static_cast<std::uint64_t>(Limits::min()) + 1;  // |min|, which is 0 for unsigned types
   return *digits <= most ? std::optional<Integer>(static_cast<Integer>(~*digits + 1)) : std::nullopt;
 }
 

@@ -46,7 +46,7 @@ void SetDefault(const FieldDescriptor& field, Message* message) {
   reflection.MutableMessage(message, &field);
 }
 
-// Writes the default of every field that is not set; of a oneof only what is set.
+// Sets every field that is not set to its default. In a oneof it touches only the member that is set.
 void Materialise(Message* message) {
   const Reflection& reflection = *message->GetReflection();
   for (int i = 0; i < message->GetDescriptor()->field_count(); ++i) {

@@ -1,4 +1,4 @@
-// Reading, overriding, checking and printing the one configuration schema.
+// Reads, overrides, checks and prints the one configuration schema. Thread-safe: pure functions.
 #pragma once
 
 #include <string>
@@ -11,10 +11,11 @@
 
 namespace dbr {
 
-// Reads a text-format Config, applies `overrides` ("path.to.field=value", as of --set; a repeated field takes
-// "path=[a, b]" or "path=a"), and checks it. InvalidArgument lists ALL that is wrong: unknown fields with
-// line and column and the nearest known name, values of another type, and fields out of bounds with path,
-// bounds and value.
+// Reads a text-format Config, applies `overrides` and checks the result. An override is
+// "path.to.field=value", as --set takes it; for a repeated field, "path=[a, b]" or "path=a". Blocks for
+// LoadConfig's reading of the file. Returns InvalidArgument with ALL errors: unknown fields with line, column
+// and the nearest known name, values of another type, and fields out of bounds with path, bounds and value.
+// LoadConfig also returns ReadFile's errors.
 absl::StatusOr<Config> LoadConfig(const std::string& path, const std::vector<std::string>& overrides = {});
 absl::StatusOr<Config> ParseConfig(absl::string_view text, const std::vector<std::string>& overrides = {});
 
@@ -25,14 +26,14 @@ Config WithDefaults(const Config& config);
 // WithDefaults(config) as text; ParseConfig reads it back as that.
 std::string PrintConfig(const Config& config);
 
-// Whether all of the updates are made on the seed buffer, so that no actor ever acts.
+// Whether all updates are made on the seed buffer, so that no actor ever acts.
 bool TrainsOfflineAlone(const Config& config);
 
-// Whether transitions carry their Monte-Carlo returns (TransitionLayout::Of): DBR's advantage SIL takes R -
-// V(s).
+// Whether transitions carry their Monte-Carlo returns (TransitionLayout::Of). DBR's advantage SIL needs them
+// for R - V(s).
 bool NeedsReturns(const AlgorithmConfig& config);
 
-// `hidden_sizes` or the paper's 256, 256, 256.
+// Returns the config's hidden_sizes, or the paper's 256, 256, 256 where it has none.
 std::vector<int> HiddenSizes(const Config& config);
 
 }  // namespace dbr

@@ -20,7 +20,8 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 using google::protobuf::Reflection;
 
-// The entries of "[a, b]" or "a". Quotes around an entry are taken off, and protect commas.
+// Returns the entries of "[a, b]" or "a". Quotes around an entry are removed; a comma within them is part of
+// the entry.
 std::vector<std::string> SplitEntries(absl::string_view text) {
   if (!(absl::ConsumePrefix(&text, "[") && absl::ConsumeSuffix(&text, "]"))) return {std::string(text)};
   std::vector<std::string> entries;
@@ -49,7 +50,7 @@ std::string Unquote(const std::string& text) {
   return quoted && absl::CUnescape(absl::string_view(text).substr(1, text.size() - 2), &plain) ? plain : text;
 }
 
-// Replaces the field by `value`: fields in braces for a message, entries for a list, else a scalar.
+// Replaces the field by `value`: fields in braces for a message, entries for a list, a scalar otherwise.
 void Replace(const std::string& path, absl::string_view value, const FieldDescriptor& field, Message* message,
              std::vector<std::string>* errors) {
   const Reflection& reflection = *message->GetReflection();

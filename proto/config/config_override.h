@@ -1,4 +1,4 @@
-// One "--set path.to.field=value". For the readers in this room.
+// Applies one "--set path.to.field=value". Only the readers in this folder use it.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -10,9 +10,9 @@
 
 namespace dbr {
 
-// Applies "path.to.field=value" to `message`: a scalar, a list "[a, b]" or "a" that replaces the field's
-// entries, or the fields of a message in braces. Text needs no quotes. Appends to `errors` what is wrong,
-// each with the path.
+// Applies "path.to.field=value" to `message`. The value is a scalar, a list "[a, b]" or "a" that replaces the
+// field's entries, or the fields of a message in braces. Text needs no quotes. Appends each error to
+// `errors`, with its path.
 void ApplyOverride(absl::string_view setting, google::protobuf::Message* message,
                    std::vector<std::string>* errors);
 

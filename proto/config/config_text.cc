@@ -15,7 +15,7 @@ using google::protobuf::Message;
 using google::protobuf::Reflection;
 using google::protobuf::io::Tokenizer;
 
-// Adds the tokenizer's own complaints (an open string, a stray character) to the list.
+// Adds the tokenizer's own errors (an open string, an unexpected character) to the list.
 class LexicalErrors : public google::protobuf::io::ErrorCollector {
  public:
   explicit LexicalErrors(std::vector<std::string>* errors) : errors_(errors) {}
@@ -27,8 +27,8 @@ class LexicalErrors : public google::protobuf::io::ErrorCollector {
   std::vector<std::string>* errors_;
 };
 
-// Recursive descent over fields. Methods return false once the structure is broken; errors that leave the
-// structure clear are noted and passed over.
+// Parses fields by recursive descent. Methods return false once the structure is broken. They record an error
+// that leaves the structure clear and continue.
 class TextReader {
  public:
   TextReader(absl::string_view text, std::vector<std::string>* errors)
@@ -40,7 +40,7 @@ class TextReader {
     tokenizer_.Next();
   }
 
-  // Fields until `closing` ("" is the end of the text), which is consumed.
+  // Reads fields until `closing`, and consumes it. "" means the end of the text.
   bool ReadFields(absl::string_view closing, const std::string& path, Message* message) {
     for (;;) {
       if (AtEnd()) return closing.empty() || Broken(absl::StrCat("'", closing, "'"));
@@ -96,7 +96,7 @@ class TextReader {
     if (text_expected && !text_found) {
       error = absl::StrCat("expected text in quotes, found ", value);
     } else {
-      // Quotes where none belong stay in the text, which then is no value of the field's type.
+      // Unexpected quotes stay in the text, which then is no value of the field's type.
       error =
           SetFromText(text_expected || !text_found ? value : absl::StrCat("\"", value, "\""), field, message);
     }
@@ -104,7 +104,7 @@ class TextReader {
     return true;
   }
 
-  // Strings come without their quotes, neighbours joined; numbers and names with their sign.
+  // Reads a scalar. Neighbouring strings are joined, without their quotes. Numbers and names keep their sign.
   bool ReadScalar(std::string* value) {
     if (tokenizer_.current().type == Tokenizer::TYPE_STRING) {
       while (tokenizer_.current().type == Tokenizer::TYPE_STRING) {
@@ -120,7 +120,7 @@ class TextReader {
     return true;
   }
 
-  // Passes over a value of unknown type.
+  // Skips a value of unknown type.
   bool SkipValue() {
     if (!LookingAt("{") && !LookingAt("<") && !LookingAt("[")) {
       std::string ignored;
