@@ -10,19 +10,20 @@ namespace dbr {
 
 struct Figure;  // envs/figure.h
 
-// What a step gave. `terminated`: the task ended, no future value. `truncated`: cut at the time limit, the
-// future has value.
+// The result of one step. `terminated`: the task ended and there is no future value. `truncated`: the episode
+// was cut at the time limit, so the state still has future value.
 struct StepResult {
   float reward = 0;
   bool terminated = false;
   bool truncated = false;
-  bool broken = false;  // truncated because the world failed: reward 0, the last sound observation once more
-  float score = 0;      // with the end of an episode where the spec has a score: 1 win, 0.5 draw, 0 loss
+  bool broken = false;  // the world failed: truncated, with reward 0 and the last finite observation again
+  float score = 0;      // at the end of an episode, where the spec has a score: 1 win, 0.5 draw, 0 loss
 
   bool done() const { return terminated || truncated; }
 };
 
-// One world. One thread at a time; the same seed and actions give the same episode. Not copyable.
+// One world. Its maker owns it. One thread at a time. The same random seed and the same actions give the same
+// episode. Not copyable.
 class Env {
  public:
   virtual ~Env() = default;
@@ -39,7 +40,8 @@ class Env {
   virtual StepResult Step(absl::Span<const float> action, absl::Span<float> observation,
                           absl::Span<float> mask) = 0;
 
-  // What it looks like now, for drawing; after the first Reset. False where it has no figure.
+  // Describes how the world looks now, for drawing. Requires an earlier Reset. Returns false where the
+  // environment has no figure.
   virtual bool GetFigure(Figure*) const { return false; }
 };
 

@@ -1,27 +1,27 @@
-// What an environment looks like at a moment: enough to draw it, and no more.
+// Describes how an environment looks at one moment: enough to draw it.
 #pragma once
 
 #include <vector>
 
 namespace dbr {
 
-// Forward, left and up (m).
+// A point: forward, left and up, in m.
 struct Point {
   double x = 0;
   double y = 0;
   double z = 0;
 };
 
-// A capsule; a ball where both ends are one.
+// A capsule. It is a ball where both ends are the same point.
 struct Limb {
   Point from;
   Point to;
   double radius_m = 0;
-  int rank = 0;           // 0: the trunk, 1: what hangs on it, and so on
-  bool far_side = false;  // seen from the side, it is behind all others
+  int rank = 0;           // 0 for the trunk, 1 for the limbs on the trunk, and so on
+  bool far_side = false;  // in the view from the side it is behind all others
 };
 
-// From where a figure is seen best: one that moves in a plane from its side, others from a corner above.
+// The best view of a figure: from the side for one that moves in a plane, from a corner above for others.
 enum class View { kSide, kSlant };
 
 // The floor is at height 0.

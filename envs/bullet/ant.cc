@@ -5,15 +5,15 @@
 namespace dbr::bullet {
 namespace {
 
-constexpr float kRadius = 0.08f;  // m, of a leg
-constexpr float kReach = 0.2f;    // m, forward and sideways, from joint to joint
+constexpr float kRadius = 0.08f;  // m, a leg's
+constexpr float kReach = 0.2f;    // m from joint to joint, forward and sideways
 constexpr double kTorque = 250;   // Nm
 
 bool Stands(const Stance& stance) {
   return stance.height_m > 0.26;
 }
 
-// Which way a leg points: forward or back, left or right (each 1 or -1).
+// The direction of a leg: forward or back, left or right. Each value is 1 or -1.
 struct Corner {
   float forward;
   float left;
@@ -23,8 +23,8 @@ Vec3 Towards(const Corner& corner, float reach) {
   return {corner.forward * reach, corner.left * reach, 0};
 }
 
-// The foot turns about the level axis across the leg, which is the same for a leg and the one opposite: what
-// bends the one down bends the other up. The limits keep every foot pointing down.
+// The foot turns about the level axis across the leg. A leg and the opposite one have the same axis, so that
+// a positive turn bends one of them down and the other up. The limits keep every foot pointing down.
 Hinge Ankle(const Corner& corner) {
   const bool positive_is_down = corner.forward > 0;
   return {.axis = {corner.forward == corner.left ? -1.0f : 1.0f, 1, 0},

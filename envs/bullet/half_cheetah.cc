@@ -5,10 +5,10 @@
 namespace dbr::bullet {
 namespace {
 
-constexpr float kRadius = 0.046f;  // m, of every limb
-constexpr double kFootMass = 10;   // kg: the feet alone do not weigh what their volume would
+constexpr float kRadius = 0.046f;  // m, every limb's
+constexpr double kFootMass = 10;   // kg: only the feet have another mass than their volume gives
 
-// The places in `feet` of all that is no foot: thighs and shins.
+// The indices in `feet` of the parts that are not feet: thighs and shins.
 constexpr int kFrontShin = 1, kFrontThigh = 2, kBackShin = 4, kBackThigh = 5;
 
 bool Stands(const Stance& stance) {

@@ -9,7 +9,7 @@ bool Stands(const Stance& stance) {
   return stance.height_m > 0.8 && std::abs(stance.pitch_rad) < 1.0;
 }
 
-// Bends backward.
+// A hinge that bends backward.
 Hinge Bends(float lower_degrees, float upper_degrees) {
   return {.axis = {0, -1, 0},
           .lower_rad = Degrees(lower_degrees),
@@ -19,7 +19,7 @@ Hinge Bends(float lower_degrees, float upper_degrees) {
 
 }  // namespace
 
-// All frames are the world's own, at the robot's feet: heights are over the floor.
+// All frames are the world's frame, at the robot's feet. Heights are above the floor.
 RobotPlan HopperPlan() {
   return {.body = {.root = Root::kPlanar,
                    .friction = 0.8f,

@@ -5,8 +5,8 @@
 
 namespace dbr::bullet {
 
-// 15 observations, 3 actions: hip, knee, ankle. Falls when its torso sinks below 0.8 m or leans by more than
-// 1 rad.
+// 15 observations and 3 actions: hip, knee and ankle. It falls when its torso sinks below 0.8 m or leans by
+// more than 1 rad.
 RobotPlan HopperPlan();
 
 }  // namespace dbr::bullet

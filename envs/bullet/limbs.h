@@ -1,4 +1,4 @@
-// Where the limbs and joints of a robot are, for drawing.
+// Finds where the limbs and joints of a robot are, for drawing.
 #pragma once
 
 #include "envs/bullet/body_plan.h"
@@ -7,7 +7,8 @@
 
 namespace dbr::bullet {
 
-// Replaces the limbs and joints of `figure` by those of the robot, which is of that plan.
+// Replaces the limbs and joints of `figure` by those of `robot`. `plan` is the plan that the robot was made
+// from.
 void DescribeLimbs(const BodyPlan& plan, const Multibody& robot, Figure* figure);
 
 }  // namespace dbr::bullet

@@ -34,7 +34,7 @@ void LocomotionEnv::Reset(std::uint64_t seed, absl::Span<float> observation, abs
 
 StepResult LocomotionEnv::Step(absl::Span<const float> action, absl::Span<float> observation,
                                absl::Span<float>) {
-  DBR_CHECK(steps_left_ > 0);  // Reset comes first
+  DBR_CHECK(steps_left_ > 0);  // requires Reset
   if (!AllFinite(action)) return Break(observation);
   const Progress progress = task_->Advance(action, observation);
   if (!progress.finite) return Break(observation);
@@ -48,8 +48,8 @@ StepResult LocomotionEnv::Step(absl::Span<const float> action, absl::Span<float>
   return result;
 }
 
-// A world that breaks is the simulation's fault and says nothing of the state's worth. So the episode is cut,
-// not terminated, at the last observation that was finite, and its reward is 0.
+// A world that breaks is the simulation's error and says nothing about the value of the state. So the episode
+// is truncated, not terminated, at the last finite observation, and the reward is 0.
 StepResult LocomotionEnv::Break(absl::Span<float> observation) {
   std::copy(last_observation_.begin(), last_observation_.end(), observation.begin());
   broken_ = true;

@@ -11,10 +11,10 @@
 
 namespace dbr::bullet {
 
-// Observation as in locomotion_task.h, actions [-1, 1] for each hinge. The seed of an episode draws the
-// hinges' angles at its start, each uniform in [-0.1, 0.1] rad. An episode is terminated by a fall where the
-// plan says so, truncated after 1,000 steps, and truncated as `broken` where the simulation gives values that
-// are not finite.
+// Owns the task. One thread at a time. The observation is that of locomotion_task.h; the actions are one
+// value in [-1, 1] for each hinge. The random seed of an episode draws the hinges' angles at its start, each
+// uniform in [-0.1, 0.1] rad. A fall terminates the episode where the plan says so. After 1,000 steps it is
+// truncated. It is truncated as `broken` where the simulation or the action has values that are not finite.
 class LocomotionEnv : public Env {
  public:
   static constexpr int kMaxEpisodeSteps = 1000;
@@ -34,8 +34,8 @@ class LocomotionEnv : public Env {
   std::unique_ptr<LocomotionTask> task_;
   EnvSpec spec_;
   std::vector<float> last_observation_;
-  int steps_left_ = 0;   // of the episode; 0: none is running
-  bool broken_ = false;  // the world has to be made anew
+  int steps_left_ = 0;   // steps left in the episode; 0: no episode is running
+  bool broken_ = false;  // the world must be made again
 };
 
 }  // namespace dbr::bullet

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kTargetX = 1000;  // m
 constexpr double kTargetY = 0;
-constexpr int kTorsoValues = 8;  // of an observation, before hinges and feet
+constexpr int kTorsoValues = 8;  // values of an observation before hinges and feet
 constexpr float kLargestValue = 5;
 constexpr double kTorsoSpeedScale = 0.3;
 constexpr double kHingeSpeedScale = 0.1;
@@ -32,7 +32,7 @@ struct Attitude {
   double yaw = 0;
 };
 
-// Straight up and straight down, only the difference of roll and yaw is known: it counts as yaw.
+// Where the pitch is straight up or down, only the difference of roll and yaw is known. It counts as yaw.
 Attitude AttitudeOf(const btQuaternion& q) {
   constexpr double kVertical = 0.99999;
   constexpr double kRightAngle = 0.5 * SIMD_PI;
@@ -44,7 +44,7 @@ Attitude AttitudeOf(const btQuaternion& q) {
           std::atan2(2 * (q.x() * q.y() + q.w() * q.z()), ww + xx - yy - zz)};
 }
 
-// -1 and 1 at the limits.
+// Returns the hinge's place between its limits, which are -1 and 1.
 double PlaceBetweenLimits(const Hinge& hinge, double angle) {
   const double lower = hinge.lower_rad, upper = hinge.upper_rad;
   return 2 * (angle - 0.5 * (lower + upper)) / (upper - lower);
@@ -52,14 +52,14 @@ double PlaceBetweenLimits(const Hinge& hinge, double angle) {
 
 }  // namespace
 
-// Where the robot is: the mean of its parts, the torso's height and attitude.
+// The place of the robot: the mean of its parts (m), and the torso's height (m) and attitude.
 struct LocomotionTask::Place {
   double x = 0;
   double y = 0;
   double height = 0;
   Attitude attitude;
 
-  // Grows by 1 a step at a metre a second.
+  // The potential. It grows by 1 in each step at a speed of 1 m/s.
   double Potential() const {
     const double dx = kTargetX - x, dy = kTargetY - y;
     return -std::sqrt(dy * dy + dx * dx) / World::kTimeStep;
@@ -86,7 +86,7 @@ LocomotionTask::LocomotionTask(const RobotPlan& plan)
   for (std::size_t i = 0; i < plan_.feet.size(); ++i) {
     foot_of_link_[robot_->PartLink(robot_->FindPart(plan_.feet[i]))] = static_cast<int>(i);
   }
-  // PyBullet lists the torso after the first link, wherever it comes in the robot.
+  // PyBullet lists the torso after the first link, at any place of the torso in the robot.
   const int torso = robot_->torso_link();
   for (int link = 0; link < robot_->num_links(); ++link) {
     if (link != torso) parts_in_mean_.push_back(link);
@@ -192,7 +192,7 @@ void LocomotionTask::FeelFloor() {
   });
 }
 
-// What driving and holding cost, added in single precision as NumPy does with float32.
+// The cost of driving and holding the hinges, added in single precision as NumPy does with float32.
 double LocomotionTask::Electricity(absl::Span<const float> action) const {
   const float driving =
       NumpyMean<float>(action.size(), [&](std::size_t i) { return std::abs(action[i] * hinge_speeds_[i]); });

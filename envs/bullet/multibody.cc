@@ -16,7 +16,7 @@ constexpr int kPlanarRootLinks = 3;
 const btVector3 kNowhere(0, 0, 0);
 
 int CountLinks(const BodyPlan& plan) {
-  int links = plan.root == Root::kPlanar ? kPlanarRootLinks : -1;  // a free torso is the base, no link
+  int links = plan.root == Root::kPlanar ? kPlanarRootLinks : -1;  // a free torso is the base and not a link
   for (const Part& part : plan.parts) links += part.hinge.has_value() ? 2 : 1;
   return links;
 }
@@ -73,7 +73,7 @@ void Multibody::MakeBase(const BodyPlan& plan) {
   AddPartCollider(kBase, shape);
 }
 
-// A slide forward, a slide up and a turn about the axis to the left, each a link without mass.
+// Adds a slide forward, a slide up and a turn about the axis to the left. Each is a link without mass.
 void Multibody::AddPlanarRoot(const Part& torso) {
   const btQuaternion straight = btQuaternion::getIdentity();
   body_->setupPrismatic(0, 0, kNowhere, kBase, straight, btVector3(1, 0, 0), Widen(torso.position), kNowhere,
@@ -126,7 +126,7 @@ btCollisionShape* Multibody::KeepShape(const Part& part) {
   return shapes_.back().get();
 }
 
-// Bullet numbers its islands by colliders, so that links without a shape need one too.
+// Bullet numbers its islands by colliders, so links without a shape need a collider too.
 void Multibody::AddMasslessCollider(int link, int group, int mask) {
   auto empty = std::make_unique<btCompoundShape>();
   empty->setMargin(0);
@@ -153,8 +153,9 @@ btMultiBodyLinkCollider& Multibody::AddCollider(int link, btCollisionShape* shap
   return collider;
 }
 
-// A motor for every joint, each without force. They push nothing, yet Bullet sorts all constraints of an
-// island with a sort that is not stable: how many there are decides the order in which the limits are solved.
+// Adds a motor without force for every joint. They push nothing. But Bullet sorts all constraints of an
+// island with a sort that is not stable, so the number of constraints decides the order in which the limits
+// are solved.
 void Multibody::AddMotors() {
   for (int link = 0; link < body_->getNumLinks(); ++link) {
     if (body_->getLink(link).m_dofCount == 0) continue;

@@ -1,4 +1,4 @@
-// Sums in the order in which NumPy adds, so that they agree with it in the last bit.
+// Adds in the same order as NumPy, so that sums agree with NumPy's in the last bit.
 #pragma once
 
 #include <array>
@@ -6,8 +6,9 @@
 
 namespace dbr::bullet {
 
-// The sum of value(0) to value(count - 1); count at most 128, beyond which NumPy would split. Fewer than 8
-// are added one by one; else eight running sums are, then what does not fill another eight.
+// Returns the sum of value(0) to value(count - 1). Requires count <= 128, because NumPy splits longer sums.
+// Fewer than 8 values are added one by one. Else there are eight running sums, and the last values that do
+// not fill another eight are added one by one. O(count).
 template <typename T, typename Value>
 T NumpySum(std::size_t count, Value value) {
   constexpr std::size_t kWays = 8;

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kDensity = 1000;  // kg/m3
 
-// Adds up spheres and cylinders one by one, for the last bit of a mass depends on the order.
+// Adds a capsule's volume as a sphere and then a cylinder: the last bit of a mass depends on the order.
 void AddCapsule(double radius, double length, double& volume) {
   volume += 4. / 3. * SIMD_PI * radius * radius * radius;
   volume += SIMD_PI * radius * radius * length;

@@ -1,4 +1,4 @@
-// From a part of a body plan to Bullet's shapes and to what the part weighs.
+// Makes Bullet's shapes from a part of a body plan, and finds the part's mass.
 #pragma once
 
 #include <memory>
@@ -14,18 +14,18 @@ inline btVector3 Widen(const Vec3& v) {
   return btVector3(v.x, v.y, v.z);
 }
 
-// In the frame of its part, its length along z.
+// The rod's pose in the frame of its part. The rod's length is along z.
 btTransform PoseOf(const Rod& rod);
 
-// The centre of mass as PyBullet's importer places it: the middle of the first bone, and the frame's origin
-// for a part of rods or a ball alone.
+// The centre of mass, where PyBullet's importer puts it: at the middle of the first bone, or at the frame's
+// origin for a part that has only rods or a ball.
 btVector3 CentreOf(const Part& part);
 
-// The mass that the plan states, else that of the volume at 1,000 kg/m3.
+// The mass (kg) that the plan states, or else that of the volume at 1,000 kg/m3.
 double MassOf(const Part& part);
 
-// The shapes of a part about its centre of mass. A ball alone stands for itself, all else is a compound,
-// whose children are appended to `children`; they have to live as long as it does.
+// Makes the shapes of a part around its centre of mass. A single ball is returned as it is. Everything else
+// is a compound; its children are appended to `children` and must live as long as it does.
 std::unique_ptr<btCollisionShape> MakeShape(const Part& part,
                                             std::vector<std::unique_ptr<btCollisionShape>>& children);
 

@@ -6,7 +6,7 @@
 namespace dbr::bullet {
 namespace {
 
-constexpr double kLegTorque = 40;   // Nm, of hips and knees
+constexpr double kLegTorque = 40;   // Nm, hips and knees
 constexpr double kFootTorque = 12;  // Nm
 
 bool Stands(const Stance& stance) {
@@ -20,9 +20,10 @@ Hinge Bend(float lower_degrees, float upper_degrees, double torque_nm) {
           .torque_nm = torque_nm};
 }
 
-// A leg's parts; the left ones' names end in `side`. Heights are over the floor.
+// Adds a leg's parts. `side` is the end of the left leg's names and empty for the right leg. Heights are
+// above the floor.
 void AddLeg(const std::string& side, std::vector<Part>& parts) {
-  const bool far_side = !side.empty();  // seen from the right, the left leg is behind
+  const bool far_side = !side.empty();  // in the view from the right the left leg is behind
   parts.push_back({.name = "thigh" + side,
                    .parent = "torso",
                    .pivot = {0, 0, 1.05f},

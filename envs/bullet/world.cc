@@ -7,7 +7,7 @@
 namespace dbr::bullet {
 namespace {
 
-constexpr int kMaxColliders = 64;  // in the broadphase; the largest robot has 21, the floor is one more
+constexpr int kMaxColliders = 64;  // in the broadphase; the largest robot has 21 and the floor is one more
 
 bool IsEmpty(const btBroadphaseProxy& proxy) {
   const auto* const collider = static_cast<const btCollisionObject*>(proxy.m_clientObject);
@@ -17,8 +17,9 @@ bool IsEmpty(const btBroadphaseProxy& proxy) {
 
 }  // namespace
 
-// Keeps a pair when either side's mask holds the other's group: with both, robots would fall through the
-// floor. Refuses those that can never touch, for a massless link has an empty shape.
+// Keeps a pair when either object's mask holds the other's group. If both masks had to match, robots would
+// fall through the floor. Refuses pairs with a link without mass: its shape is empty, so they can never
+// touch.
 class World::PairFilter : public btOverlapFilterCallback {
  public:
   bool needBroadphaseCollision(btBroadphaseProxy* a, btBroadphaseProxy* b) const override {
@@ -39,7 +40,7 @@ World::World()
   broadphase_->getOverlappingPairCache()->setOverlapFilterCallback(pair_filter_.get());
   world_->setGravity(btVector3(0, 0, -9.8));
   world_->setForceUpdateAllAabbs(false);
-  // Islands stay split: without, Bullet ignores the joint limits of robots that touch nothing.
+  // Split islands are necessary: without them, Bullet ignores the joint limits of robots that touch nothing.
   world_->getSimulationIslandManager()->setSplitIslands(true);
   world_->getDispatchInfo().m_deterministicOverlappingPairs = true;
   btContactSolverInfo& solver = world_->getSolverInfo();

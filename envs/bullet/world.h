@@ -1,4 +1,4 @@
-// A Bullet world with a floor, set up as PyBullet's locomotion environments set up theirs.
+// A Bullet world with a floor, set up as in PyBullet's locomotion environments.
 #pragma once
 
 #include <memory>
@@ -10,15 +10,17 @@
 
 namespace dbr::bullet {
 
-// The groups that decide who may collide. PyBullet keeps a pair where EITHER group is in the other's mask.
+// The groups decide which objects may collide. PyBullet keeps a pair where EITHER object's group is in the
+// other's mask.
 inline constexpr int kMovingGroup = 1;
 inline constexpr int kStaticGroup = 2;
 inline constexpr int kCollidesWithAll = -1;
 
-// Owns the world and the floor; robots add themselves, and go before it does. One thread at a time.
+// Owns the Bullet world and the floor. Robots add themselves and must be destroyed before it. One thread at a
+// time.
 class World {
  public:
-  static constexpr double kTimeStep = 0.0165;  // s, of an environment's step
+  static constexpr double kTimeStep = 0.0165;  // s, an environment's step
   static constexpr int kSubsteps = 4;
 
   World();
@@ -26,14 +28,14 @@ class World {
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  // Moves on by kTimeStep. Joint torques hold for all of it and are gone afterwards.
+  // Moves the world by kTimeStep. Joint torques hold during the whole step and are cleared after it.
   void Step();
 
-  // Drops all contact points, so that the past has no part in what comes.
+  // Removes all contact points, so that the past has no effect on the next step.
   void ForgetContacts();
 
   // Calls `visit` with the collider of each link that has a contact point with the floor, at any distance up
-  // to Bullet's contact breaking threshold; a link may come more than once.
+  // to Bullet's contact breaking threshold. A link may be visited more than once. O(contact manifolds).
   template <typename Visit>
   void ForEachTouchingFloor(Visit visit) const {
     const int count = dispatcher_->getNumManifolds();
@@ -62,7 +64,7 @@ class World {
   std::unique_ptr<btCollisionShape> floor_shape_;
   std::unique_ptr<btMultiBody> floor_;
   std::unique_ptr<btMultiBodyLinkCollider> floor_collider_;
-  std::unique_ptr<btMultiBodyDynamicsWorld> world_;  // last: goes before all that it refers to
+  std::unique_ptr<btMultiBodyDynamicsWorld> world_;  // last: destroyed before everything that it uses
 };
 
 }  // namespace dbr::bullet

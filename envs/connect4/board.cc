@@ -13,14 +13,14 @@ absl::Status BadMove(absl::string_view moves, std::size_t index, absl::string_vi
                                                  moves.substr(index, 1), "': ", why));
 }
 
-// The columns of some cells, as bits.
+// Returns the columns that have one of `cells`, as bits.
 unsigned ColumnsOf(Cells cells) {
   unsigned columns = 0;
   for (; cells != 0; cells &= cells - 1) columns |= 1u << (std::countr_zero(cells) / kColumnStride);
   return columns;
 }
 
-// Sets the floats of some cells in a plane [kRows x kColumns].
+// Sets the floats of `cells` in a plane [kRows x kColumns] to 1.
 void MarkCells(Cells cells, float* plane) {
   for (; cells != 0; cells &= cells - 1) {
     const int bit = std::countr_zero(cells);

@@ -15,9 +15,17 @@ inline constexpr int kRows = 6;
 inline constexpr int kCells = kColumns * kRows;
 inline constexpr int kObservationSize = 2 * kCells;
 
-// A set of cells. The cell of (column, row), row 0 at the bottom, is bit 7 * column + row. The seventh bit of
-// each column is never set on a board: it keeps lines from running from the top of a column into the bottom
-// of the next.
+// A set of cells. The cell of (column, row), with row 0 at the bottom, is bit 7 * column + row. The seventh
+// bit of each column is never set on a board. It prevents lines from the top of one column into the bottom of
+// the next.
+//
+//   bit of each cell:      5 12 19 26 33 40 47   row 5 (top)
+//                          4 11 18 25 32 39 46
+//                          3 10 17 24 31 38 45
+//                          2  9 16 23 30 37 44
+//                          1  8 15 22 29 36 43
+//                          0  7 14 21 28 35 42   row 0
+//               column     0  1  2  3  4  5  6
 using Cells = std::uint64_t;
 
 inline constexpr int kColumnStride = kRows + 1;
@@ -28,7 +36,7 @@ constexpr Cells Cell(int column, int row) {
   return Cells{1} << (kColumnStride * column + row);
 }
 
-// Whether the stones hold four in a line: up, across, or along one of the two diagonals.
+// Whether the stones hold four in a line: vertical, horizontal or on one of the two diagonals.
 constexpr bool HasFour(Cells stones) {
   const Cells up = stones & (stones >> 1);
   const Cells across = stones & (stones >> kColumnStride);
@@ -39,20 +47,20 @@ constexpr bool HasFour(Cells stones) {
           (falling & (falling >> (2 * (kColumnStride - 1))))) != 0;
 }
 
-// The cells where the next stone of each column would land; a full column has none.
+// The cells where the next stone of each column would land. A full column has none.
 constexpr Cells LandingCells(Cells occupied) {
   return (occupied + kBottomRow) & kAllCells;
 }
 
-// A position, a value of 16 bytes. Columns count from 0 at the left. Nothing here checks that a move is
-// legal: callers that take moves from outside ask IsLegal first.
+// A position: a plain value of 16 bytes. Columns count from 0 at the left. No function checks that a move is
+// legal; callers that take moves from outside must call IsLegal first.
 class Board {
  public:
   Board() = default;
 
-  // Plays `moves`, columns '1' (left) to '7', from the empty board; the game may end with the last of them.
-  // InvalidArgument, naming position and character, for another character, a full column, or a move after the
-  // end.
+  // Plays `moves`, columns '1' (left) to '7', from the empty board. The game may end with the last move.
+  // Returns InvalidArgument, with the position and the character, for another character, a full column, or a
+  // move after the end.
   static absl::StatusOr<Board> FromMoves(absl::string_view moves);
 
   // Requires IsLegal(column).
@@ -63,15 +71,17 @@ class Board {
     occupied_ |= cell;
   }
 
-  // Whether a stone may be put there: a column of the board, not full, in a game that has not ended.
+  // Whether a stone may be put into `column`: it is a column of the board and not full, and the game has not
+  // ended.
   bool IsLegal(int column) const {
     return column >= 0 && column < kColumns && !IsOver() && (occupied_ & Cell(column, kRows - 1)) == 0;
   }
-  // Bit c is set where IsLegal(c); none once the game is over.
+  // Bit c is set where IsLegal(c). No bit is set once the game is over.
   unsigned LegalColumns() const;
 
-  // Columns in which the side to move would win at once, as bits; the same for the other side if it were its
-  // turn. The second is what must be blocked. Both require a game that is not over.
+  // Bit c is set where column c completes four. WinningColumns: columns in which the side to move wins at
+  // once. ThreatenedColumns: columns in which the other side would win if it were its turn, and which the
+  // side to move must block. Both require a game that is not over.
   unsigned WinningColumns() const { return ColumnsCompletingFour(mover_); }
   unsigned ThreatenedColumns() const { return ColumnsCompletingFour(other()); }
 
@@ -94,12 +104,13 @@ class Board {
   Cells occupied_ = 0;
 };
 
-// Writes two planes of 6 rows x 7 columns: plane 0 the cells of `own`, plane 1 those of `other`. The float of
-// (plane, row, column) has index 42 * plane + 7 * row + column, row 0 being the bottom row of the board.
+// Writes two planes of 6 rows x 7 columns: plane 0 has the cells of `own`, plane 1 those of `other`. The
+// float of (plane, row, column) has the index 42 * plane + 7 * row + column. Row 0 is the bottom row of the
+// board.
 void WritePlanes(Cells own, Cells other, absl::Span<float> observation);
 
-// Writes what the side to move sees: its own stones in plane 0, the other's in plane 1, and the mask
-// [kColumns] with 1 for each legal column, 0 elsewhere.
+// Writes what the side to move sees: its own stones in plane 0, the other side's in plane 1, and the mask
+// [kColumns] with 1 for each legal column and 0 elsewhere.
 void WriteObservation(const Board& board, absl::Span<float> observation, absl::Span<float> mask);
 
 }  // namespace dbr::connect4

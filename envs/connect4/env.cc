@@ -10,14 +10,14 @@
 namespace dbr::connect4 {
 namespace {
 
-// The column of an action, -1 if it is none.
+// Returns the column of an action, or -1 where the action is not a column.
 int ColumnOf(absl::Span<const float> action) {
   DBR_CHECK(action.size() == 1);
   const float column = action[0];
   return column >= 0 && column < kColumns && column == std::floor(column) ? static_cast<int>(column) : -1;
 }
 
-// The last step of an episode; `outcome` is 1, 0 or -1 for the agent.
+// Returns the result of an episode's last step. `outcome` is 1, 0 or -1 for the agent.
 StepResult LastStep(int outcome) {
   StepResult result;
   result.reward = static_cast<float>(outcome);
@@ -54,9 +54,9 @@ void Connect4Env::Reset(std::uint64_t seed, absl::Span<float> observation, absl:
 
 StepResult Connect4Env::Step(absl::Span<const float> action, absl::Span<float> observation,
                              absl::Span<float> mask) {
-  DBR_CHECK(opponent_ != nullptr);  // Reset comes first
+  DBR_CHECK(opponent_ != nullptr);  // requires Reset
   const int column = ColumnOf(action);
-  DBR_CHECK(board_.IsLegal(column));  // nothing is, once the episode has ended
+  DBR_CHECK(board_.IsLegal(column));  // no column is legal once the episode has ended
   board_.Play(column);
   const bool ended_by_agent = board_.IsOver();
   if (!ended_by_agent) board_.Play(opponent_->ChooseColumn(board_, rng_));

@@ -13,17 +13,19 @@
 
 namespace dbr::connect4 {
 
-// The opponent's reply is part of the step, so an episode has at most 21 steps and never meets a time limit.
-// The seed of an episode decides everything but the agent's moves: the agent starts if the seed is even, the
-// opponent if it is odd (consecutive seeds alternate), and of several opponents one is drawn.
+// Owns its opponents. One thread at a time. The opponent's reply is part of the step, so an episode has at
+// most 21 steps and never meets a time limit. The random seed of an episode decides everything but the
+// agent's moves. The agent starts if the random seed is even, the opponent if it is odd, so consecutive seeds
+// alternate. Where there are several opponents, the random seed draws one of them.
 //
-// Observation [84] and mask [7] as WriteObservation in board.h, plane 0 being the agent's stones, also in the
-// final one, whose mask is zero. Action: the column, 0 to 6. Reward 1, 0 or -1 and score 1, 0.5 or 0 for a
-// won, drawn or lost game with the step that ends it; 0 before.
+// The observation [84] and the mask [7] are those of WriteObservation in board.h. Plane 0 always has the
+// agent's stones, also in the final observation, whose mask is zero. The action is the column, 0 to 6. The
+// step that ends the game gives reward 1, 0 or -1 and score 1, 0.5 or 0 for a won, drawn or lost game.
+// Earlier steps give reward 0.
 class Connect4Env : public Env {
  public:
-  // `opponents`: names of opponents.h; none means random. InvalidArgument for a name that MakeOpponent
-  // refuses.
+  // `opponents` are names of opponents.h; without any the opponent is random. Returns InvalidArgument for a
+  // name that MakeOpponent refuses.
   static absl::StatusOr<std::unique_ptr<Env>> Make(const std::vector<std::string>& opponents);
 
   const EnvSpec& spec() const override { return spec_; }
@@ -36,7 +38,7 @@ class Connect4Env : public Env {
 
   const EnvSpec spec_;
   const std::vector<std::unique_ptr<Opponent>> opponents_;
-  Opponent* opponent_ = nullptr;  // of this episode; null before the first
+  Opponent* opponent_ = nullptr;  // this episode's opponent; null before the first episode
   Rng rng_{0};
   Board board_;
 };

@@ -11,7 +11,7 @@
 namespace dbr::connect4 {
 namespace {
 
-constexpr float kExploration = 2.0f;  // c of UCT
+constexpr float kExploration = 2.0f;  // the constant c of UCT
 
 }  // namespace
 
@@ -29,7 +29,8 @@ int TreeSearch::ChooseColumn(const Board& board, Rng& rng) {
   ChoiceStream choices(rng);
   nodes_.assign(1, Node());
   for (int i = 0; i < simulations_ && nodes_[0].proven == kUnproven; ++i) Simulate(board, choices);
-  if (nodes_[0].children == 0) Expand(0, board, choices);  // a single simulation knows no child
+  // After a single simulation the root has no children.
+  if (nodes_[0].children == 0) Expand(0, board, choices);
   return nodes_[ChildToPlay()].landing_bit / kColumnStride;
 }
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr absl::string_view kMctsPrefix = "mcts:";
 
-// A uniformly drawn set bit of some columns.
+// Returns a uniformly drawn set bit of `columns`.
 int DrawColumn(unsigned columns, Rng& rng) {
   return std::countr_zero(ChoiceStream(rng).SetBit(columns));
 }

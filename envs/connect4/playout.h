@@ -1,4 +1,4 @@
-// A game played to its end by uniformly random moves: the evaluation inside the tree search. Kept in a header
+// Plays a game to its end by uniformly random moves: the evaluation inside the tree search. It is in a header
 // because it is the innermost loop of every search.
 #pragma once
 
@@ -14,8 +14,8 @@
 
 namespace dbr::connect4 {
 
-// The set bit of `bits` that has `n` set bits below it; requires n < popcount(bits). The loop serves machines
-// without BMI2.
+// Returns the set bit of `bits` that has `n` set bits below it. Requires n < popcount(bits). The loop serves
+// machines without BMI2.
 inline std::uint64_t NthSetBitByLoop(std::uint64_t bits, unsigned n) {
   for (; n > 0; --n) bits &= bits - 1;
   return bits & (~bits + 1);
@@ -28,15 +28,15 @@ inline std::uint64_t NthSetBit(std::uint64_t bits, unsigned n) {
 #endif
 }
 
-// A stream of uniform choices that spends one 64-bit draw on eight of them. The draw is read as a fraction in
-// [0, 1): multiplied by n its whole part is the choice and what remains is the fraction for the next one.
-// With n <= 7 the eighth choice is biased by less than 7^8 / 2^64 < 2^-41. The generator must outlive the
-// stream; one thread at a time.
+// A stream of uniform choices that uses one 64-bit draw for eight of them. The draw is read as a fraction in
+// [0, 1). It is multiplied by n: the whole part is the choice, and the rest is the fraction for the next one.
+// With n <= 7 the bias of the eighth choice is less than 7^8 / 2^64 < 2^-41. The generator must outlive the
+// stream. One thread at a time.
 class ChoiceStream {
  public:
   explicit ChoiceStream(Rng& rng) : rng_(rng) {}
 
-  // A uniformly drawn set bit of `bits`, which has 1 to 7 of them.
+  // Returns a uniformly drawn set bit of `bits`, which must have 1 to 7 of them.
   std::uint64_t SetBit(std::uint64_t bits) {
     if (left_ == 0) {
       fraction_ = rng_();
@@ -55,12 +55,12 @@ class ChoiceStream {
   int left_ = 0;
 };
 
-// Plays uniformly random legal moves to the end: 1 if the side to move in `board` wins, -1 if it loses, 0 for
-// a draw. Requires a game that is not over.
+// Plays uniformly random legal moves to the end. Returns 1 if the side to move in `board` wins, -1 if it
+// loses, 0 for a draw. Requires a game that is not over.
 inline int RandomPlayout(const Board& board, ChoiceStream& choices) {
   Cells mover = board.mover();
   Cells other = board.other();
-  // Puts one stone for a side, the only one that can have won by it.
+  // Puts one stone for a side. Only that side can win by it.
   const auto wins = [&choices](Cells& stones, Cells occupied) {
     stones |= choices.SetBit(LandingCells(occupied));
     return HasFour(stones);

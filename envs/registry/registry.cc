@@ -1,5 +1,5 @@
-// One line an environment in the table. It is a plain table because the linker would drop a registrar in a
-// static archive.
+// A table with one line for each environment. It is a plain table because the linker would drop a registrar
+// in a static archive.
 #include "envs/registry/registry.h"
 
 #include <algorithm>
@@ -22,12 +22,12 @@ using Made = absl::StatusOr<std::unique_ptr<Env>>;
 struct Entry {
   std::string name;
   std::vector<std::string> aliases;
-  std::vector<std::string> evaluation_opponents;  // empty: a game of one, which takes no opponents
+  std::vector<std::string> evaluation_opponents;  // empty for an environment without opponents
   Made (*make)(absl::string_view name, const std::vector<std::string>& opponents);
   EnvPresentation presentation = {};
 };
 
-// An environment of the robot that `plan` makes; robots take no opponents.
+// Makes an environment with the robot that `plan` makes. Robots take no opponents.
 template <bullet::RobotPlan (*plan)()>
 Made MakeRobot(absl::string_view name, const std::vector<std::string>&) {
   return std::make_unique<bullet::LocomotionEnv>(std::string(name), plan());

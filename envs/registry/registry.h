@@ -1,4 +1,4 @@
-// The environments by name.
+// Makes environments by name. Thread-safe: pure functions.
 #pragma once
 
 #include <memory>
@@ -12,25 +12,26 @@
 
 namespace dbr {
 
-// What an environment is made with.
+// The options that an environment is made with.
 struct EnvOptions {
   std::string name;
-  // Each episode draws one; empty: the environment's default. Only two-player games have opponents.
+  // Each episode draws one of them. Empty means the environment's default. Only two-player games have
+  // opponents.
   std::vector<std::string> opponents;
 };
 
-// Makes an environment by its name or alias. InvalidArgument, naming the known names, for an unknown
-// environment or opponent, and for opponents given to an environment that has none.
+// Makes an environment by its name or alias. Returns InvalidArgument for an unknown environment or opponent,
+// with the known names, and for opponents of an environment that has none.
 absl::StatusOr<std::unique_ptr<Env>> MakeEnv(const EnvOptions& options);
 
-// All names, sorted; the conformance suite walks them.
+// All names, sorted. The conformance suite tests each of them.
 std::vector<std::string> EnvNames();
 
 // What people are told of an environment, by its name or alias; the default one for an unknown name.
 const EnvPresentation& PresentationOf(absl::string_view env_name);
 
-// Opponents against which an environment is evaluated by default, for example random, one_ply, mcts:10,
-// mcts:100; empty where it has none.
+// The opponents against which an environment is evaluated by default, for example random, one_ply, mcts:10,
+// mcts:100. Empty where it has none.
 std::vector<std::string> EvaluationOpponents(absl::string_view env_name);
 
 }  // namespace dbr
