@@ -20,9 +20,9 @@
 namespace dbr {
 namespace {
 
-constexpr std::uint64_t kActorStream = 1 << 20;      // of the config's seed; the actor's index is added
-constexpr std::uint64_t kEvaluatorStream = 1 << 19;  // of the config's seed
-constexpr std::size_t kBufferedSteps = 16;           // of each environment, where the config leaves it open
+constexpr std::uint64_t kActorStream = 1 << 20;      // stream of the seed; plus the actor's index
+constexpr std::uint64_t kEvaluatorStream = 1 << 19;  // stream of the seed
+constexpr std::size_t kBufferedSteps = 16;           // for each environment, where the config says 0
 constexpr absl::Duration kStopCheck = absl::Milliseconds(100);
 constexpr absl::Duration kReportTimeout = absl::Seconds(5);
 
@@ -69,7 +69,7 @@ EvaluationLoopOptions Evaluating(const ActorOptions& options, const std::string&
       .resumed = options.resumed};
 }
 
-// Tells of episodes whose world failed: of the first, and each time their number has doubled.
+// Logs the number of episodes whose world failed: at the first one, and each time the number has doubled.
 class BrokenWorlds {
  public:
   void Tell(const StepCounters& counters) {
@@ -122,7 +122,7 @@ absl::Status Actor::Act() {
                                     .discount = options_.config.algorithm().discount(),
                                     .with_returns = NeedsReturns(options_.config.algorithm()),
                                     .reward_scale = options_.config.algorithm().reward_scale()};
-  // An actor that starts again in the middle of a run must not play its first games once more.
+  // An actor that restarts in the middle of a run must not repeat its first games.
   const Rng rng = ActorRng(options_).Fork(first->snapshot().version);
   StepLoop loop(std::move(envs_), stepping, rng,
                 [this](const TransitionView& transition, float advantage, std::uint64_t critic_version,
@@ -142,8 +142,8 @@ absl::Status Actor::Act() {
   return absl::OkStatus();
 }
 
-// Where epsilon decays, the replay server knows how far the run has come: an actor that starts again, or in a
-// run that is resumed, goes on from there.
+// Where epsilon decays, the replay server knows how far the run has come. An actor that restarts, or starts
+// in a resumed run, continues from there.
 absl::StatusOr<ExplorationOptions> Actor::Exploring() const {
   const ActorConfig& actor = options_.config.actor();
   ExplorationOptions exploring = ExplorationOptions::Of(actor);
@@ -213,7 +213,7 @@ void EvaluatorProcess::Stop() {
 
 void EvaluatorProcess::KeepBest(const PolicySnapshot& snapshot) const {
   if (best_policy_.empty()) return;
-  std::error_code ignored;  // the file then says what is wrong
+  std::error_code ignored;  // SavePolicy then reports the error
   std::filesystem::create_directories(std::filesystem::path(best_policy_).parent_path(), ignored);
   const absl::Status saved = SavePolicy(snapshot, best_policy_);
   if (!saved.ok()) spdlog::error("the best policy so far is not kept: {}", std::string(saved.message()));

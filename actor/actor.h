@@ -1,4 +1,4 @@
-// The two programs of this room without their flags: the actor and the evaluator.
+// The actor and the evaluator: the two programs of this folder, without their flags.
 #pragma once
 
 #include <memory>
@@ -22,25 +22,26 @@ namespace dbr {
 
 struct ActorOptions {
   Config config;
-  int index = 0;      // of the actor process
-  int processes = 0;  // actors of the run; 0: as many as the config says, or one where it leaves that open
+  int index = 0;      // the actor process's number, from 0
+  int processes = 0;  // the run's actor processes; 0: the config's number, or 1 where it has none
   std::string replay_address;
   std::string learner_address;
-  bool resumed = false;          // the evaluator: another one was there before, in this run
-  std::string best_policy = {};  // file for the evaluator's best policy; empty: none is kept
-  absl::Duration drain_timeout = absl::Seconds(5);  // for what is still unacknowledged at the end
+  bool resumed = false;          // for the evaluator: an earlier one ran in this run
+  std::string best_policy = {};  // the file for the evaluator's best policy; empty: none is kept
+  absl::Duration drain_timeout = absl::Seconds(5);  // the wait at the end for acknowledgements
 };
 
 // Steps its environments by the newest policy and writes the transitions to the replay server. Without a
-// learner it goes on with the last policy; without a replay server it waits once the writer's buffer is full.
+// learner it continues with the last policy. Without a replay server it waits once the writer's buffer is
+// full. Owns its environments, its subscriber and its writer. One thread calls Run; Stop is thread-safe.
 class Actor {
  public:
-  // Errors as MakeEnv's. Connects in the background: the servers need not be there yet.
+  // Returns the errors of MakeEnv. Connects in the background, so the servers need not run yet.
   static absl::StatusOr<std::unique_ptr<Actor>> Create(const ActorOptions& options);
 
-  // Blocks until Stop(), which gives OK, or until a final error of the policy, the environments or the
-  // writer; then, in either case, until all that was written is acknowledged or drain_timeout has passed
-  // (which is said, with the counts).
+  // Blocks until Stop(), and then returns OK, or until a final error of the policy, the environments or the
+  // writer. In both cases it then blocks until everything that was written is acknowledged, or until
+  // drain_timeout has passed; it logs that with the counts.
   absl::Status Run();
 
   void Stop();  // from any thread
@@ -64,13 +65,14 @@ class Actor {
   absl::Notification stopping_;
 };
 
-// Evaluates the newest policy now and then and reports to the learner.
+// Evaluates the newest policy again and again and reports to the learner. One thread calls Run; Stop is
+// thread-safe.
 class EvaluatorProcess {
  public:
-  // Errors as MakeEnv's, for each opponent.
+  // Returns the errors of MakeEnv for any opponent.
   static absl::StatusOr<std::unique_ptr<EvaluatorProcess>> Create(const ActorOptions& options);
 
-  absl::Status Run();  // until Stop(), which gives OK, or a final error
+  absl::Status Run();  // blocks until Stop(), and then returns OK, or until a final error
   void Stop();         // from any thread
 
  private:

@@ -1,4 +1,4 @@
-// Between the step loop and its sink, where transitions carry their Monte-Carlo returns.
+// Adds Monte-Carlo returns to transitions, between the step loop and its sink.
 #pragma once
 
 #include <cstdint>
@@ -11,37 +11,39 @@
 
 namespace dbr {
 
-// Takes one transition, valid during the call, with its first advantage (kUnjudged where there is none), the
-// version of the critic behind it, and how the episode went where this transition ended it.
+// Takes one transition, which is valid during the call. With it come its first advantage (kUnjudged where
+// there is none), the version of the critic that gave it, and the result of the episode where this transition
+// ended it.
 using TransitionSink =
     std::function<absl::Status(const TransitionView& transition, float advantage,
                                std::uint64_t critic_version, const std::optional<EpisodeEnd>& end)>;
 
 struct ReturnOptions {
-  double reward_scale = 1;  // of the critics: they value reward_scale * r
-  double discount = 0.99;   // of the task, for a cut episode without a critic
+  double reward_scale = 1;  // the critics learn the values of reward_scale * r
+  double discount = 0.99;   // the task's discount, for a cut episode without a critic
 };
 
-// What is known of a transition as it is taken.
+// What is known about a transition when it is taken.
 struct TransitionValue {
   float value = 0;       // V(s), in the critics' units; NaN: there is no critic
   float next_value = 0;  // V(s'), where the transition cuts its episode
   std::uint64_t critic_version = 0;
 };
 
-// Holds the transitions of an episode back until it ends, for only then are their returns known; then passes
-// them on one after another, each with R and with the advantage reward_scale * R - V(s) (Oh et al. 2018,
-// "Self-Imitation Learning", equation 1), V(s) being that of the critic of its own step. R is in the
-// environment's units; where the episode was cut it goes on with V(s') / reward_scale, and where there is no
-// critic to say that, with the mean of the last rewards (StationaryContinuation). Holds at most an episode of
-// each environment: max_episode_steps transitions. One thread at a time.
+// Holds the transitions of an episode back until it ends, because only then are their returns known. It then
+// passes them on in order, each with its return R and the advantage reward_scale * R - V(s) (Oh et al. 2018,
+// "Self-Imitation Learning", equation 1). V(s) comes from the critic at the time of that step. R is in the
+// environment's units. Where the episode was cut, R continues with V(s') / reward_scale. Where there is no
+// critic for that, it continues with the mean of the last rewards (StationaryContinuation). Holds at most one
+// episode of each environment: max_episode_steps transitions. One thread at a time.
 class EpisodeReturns {
  public:
-  // `layout` has a return; environments are numbered from 0 to envs - 1.
+  // `layout` must have a return. Environments have the numbers 0 to envs - 1.
   EpisodeReturns(const TransitionLayout& layout, int envs, const ReturnOptions& options, TransitionSink sink);
 
-  // Takes the next transition of environment `env`, whose own return is not read. With `end` its episode goes
-  // out: blocks as the sink does, and gives its first error; what had not gone out is dropped then.
+  // Takes the next transition of environment `env`. It does not read the transition's own return. With `end`
+  // it passes the episode to the sink: it blocks as the sink does and returns the sink's first error. The
+  // rest of the episode is then dropped.
   absl::Status Add(int env, const TransitionView& transition, const TransitionValue& value,
                    const std::optional<EpisodeEnd>& end);
 
@@ -58,7 +60,7 @@ class EpisodeReturns {
   };
 
   absl::Status PassOn(const Episode& episode, const EpisodeEnd& end);
-  // What the return goes on with behind the episode's last transition, in the environment's units.
+  // The value that the return continues with after the episode's last transition, in the environment's units.
   double ValueBehind(const Episode& episode, float next_value) const;
 
   const TransitionLayout layout_;

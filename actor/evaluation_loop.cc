@@ -109,7 +109,7 @@ absl::Status EvaluationLoop::EvaluateIfDue(const PolicyNetworks& policy) {
   return EvaluateAll(policy, Reach(iteration));
 }
 
-// Goes on to a later iteration, and says what is skipped.
+// Moves to a later iteration and logs which ones are skipped.
 EvaluationLoop::Iterations EvaluationLoop::Reach(std::uint64_t iteration) {
   Iterations iterations{.current = iteration, .skipped = {}};
   std::uint64_t first = last_iteration_.has_value() ? *last_iteration_ + 1 : options_.resumed ? iteration : 0;
@@ -132,7 +132,7 @@ absl::Status EvaluationLoop::EvaluateIfNew() {
   return absl::OkStatus();
 }
 
-// Against each opponent in turn.
+// Evaluates the policy against each opponent in turn.
 absl::Status EvaluationLoop::EvaluateAll(const PolicyNetworks& policy, const Iterations& iterations) {
   const PolicySnapshot& snapshot = policy.snapshot();
   double sum = 0;

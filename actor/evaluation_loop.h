@@ -1,4 +1,4 @@
-// Evaluating the newest policy again and again while it is trained.
+// Evaluates the newest policy again and again while it is trained.
 #pragma once
 
 #include <atomic>
@@ -25,54 +25,61 @@ namespace dbr {
 
 struct EvaluationLoopOptions {
   std::vector<std::string> opponents;  // one evaluation each; {""} where the environment has none
-  int episodes = 200;                  // of each opponent
-  std::uint64_t seed = 1;              // added to the policy's version
+  int episodes = 200;                  // for each opponent
+  std::uint64_t seed = 1;              // a random seed, to which the policy's version is added
   ActingMode mode = MODE;
   int threads = 1;
   absl::Duration every = absl::Seconds(10);
-  std::uint64_t every_updates = 0;  // above 0: by updates, in place of `every`
-  // By updates: another evaluator was there before, so that what came before the first policy was its affair.
+  std::uint64_t every_updates = 0;  // above 0: evaluates by updates, in place of `every`
+  // By updates: an earlier evaluator ran in this run. It was responsible for the iterations before this
+  // loop's first policy.
   bool resumed = false;
 };
 
-// What the loop is connected to; a test passes its own.
+// The functions through which the loop reaches the rest. Tests pass their own.
 struct EvaluationLoopPorts {
   std::function<absl::StatusOr<std::shared_ptr<const PolicyNetworks>>()> newest_policy;  // null: none yet
   std::function<absl::Status(const EvaluationReport&)> report;
-  // The newest policy once it is another than `last` (null: once there is one); by updates alone.
-  // DeadlineExceeded after `timeout`; returns soon after Close(), with any error.
+  // Returns the newest policy once it differs from `last` (null: once there is one). Only evaluation by
+  // updates calls it. Returns DeadlineExceeded after `timeout`. It must return soon after Close(), with any
+  // error.
   std::function<absl::StatusOr<std::shared_ptr<const PolicyNetworks>>(
       const std::shared_ptr<const PolicyNetworks>& last, absl::Duration timeout)>
       next_policy = nullptr;
-  // Given the policy whose mean over the opponents (of scores, else of returns) is the greatest so far,
-  // before it is reported; null: nobody asks.
+  // Receives the policy whose mean over the opponents (of scores, else of returns) is the greatest so far,
+  // before it is reported. May be null.
   std::function<void(const PolicySnapshot&)> keep_best = nullptr;
   std::function<absl::Time()> now = absl::Now;
-  // Returns at the deadline, or at once after Close(); null: waits for the real time.
+  // Returns at the deadline, or at once after Close(). Null means waiting by the real clock.
   std::function<void(absl::Time)> wait_until = nullptr;
 };
 
-// By time: every `every` seconds, or as soon as the round before has ended, evaluates the newest policy
-// against each opponent unless its version is the one evaluated last. By updates: a policy of u updates
-// belongs to iteration u / every_updates, the untrained one to iteration 0. A new policy is evaluated once
-// its iteration is later than that of the last one evaluated. Training goes on meanwhile: iterations that
-// have passed by the end of a round are skipped, said in the log, and named in the next report. Reports that
-// find no learner are kept, up to kMaxUnsent of the newest, and go out in order when it is there; the loss is
-// said once and the return once. A report that the learner refuses is dropped with a word.
+// By time: every `every`, or as soon as the round before has ended, the loop evaluates the newest policy
+// against each opponent, unless it evaluated that version last.
+//
+// By updates: a policy of u updates belongs to iteration u / every_updates, and the untrained one to
+// iteration 0. The loop evaluates a new policy once its iteration is later than that of the last one
+// evaluated. Training continues meanwhile. Iterations that have passed by the end of a round are skipped; the
+// log and the next report name them.
+//
+// Reports that find no learner are kept, at most the newest kMaxUnsent. They are sent in order when a learner
+// is there. The log says once that the learner is lost and once that it is back. A report that the learner
+// refuses is logged and dropped. One thread calls Run; Close is thread-safe.
 class EvaluationLoop {
  public:
   static constexpr int kMaxUnsent = 1000;
-  static constexpr absl::Duration kSendEvery = absl::Seconds(10);  // by updates: kept reports are tried again
+  // By updates: the time between attempts to send kept reports.
+  static constexpr absl::Duration kSendEvery = absl::Seconds(10);
 
   EvaluationLoop(EvaluationLoopOptions options, EvaluationLoopPorts ports);
 
-  // Blocks until Close(), which gives OK, or until an error of newest_policy, next_policy or Evaluate.
+  // Blocks until Close(), and then returns OK, or until an error of newest_policy, next_policy or Evaluate.
   absl::Status Run();
 
-  void Close();  // from any thread; also ends an evaluation under way
+  void Close();  // from any thread; it also ends a running evaluation
 
  private:
-  // What a report says of iterations; by time there is nothing to say.
+  // What a report says about iterations. By time it is empty.
   struct Iterations {
     std::optional<std::uint64_t> current;
     std::vector<std::uint64_t> skipped;
@@ -89,9 +96,9 @@ class EvaluationLoop {
 
   const EvaluationLoopOptions options_;
   EvaluationLoopPorts ports_;
-  std::shared_ptr<const PolicyNetworks> evaluated_;  // last; by time
-  std::optional<std::uint64_t> last_iteration_;      // that was evaluated
-  std::uint64_t skipped_ = 0;                        // iterations so far
+  std::shared_ptr<const PolicyNetworks> evaluated_;  // the last one evaluated; by time
+  std::optional<std::uint64_t> last_iteration_;      // the last one evaluated; by updates
+  std::uint64_t skipped_ = 0;                        // the number of iterations skipped so far
   std::deque<EvaluationReport> unsent_;
   double best_ = -std::numeric_limits<double>::infinity();
   bool said_loss_ = false;
@@ -100,8 +107,8 @@ class EvaluationLoop {
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
 };
 
-// "" alone for an environment without opponents; else `configured`, or where that is empty
-// EvaluationOpponents(env).
+// Returns `configured`, or EvaluationOpponents(env) where `configured` is empty, or {""} where both are
+// empty.
 std::vector<std::string> OpponentsToEvaluate(const std::string& env,
                                              const std::vector<std::string>& configured);
 

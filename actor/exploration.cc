@@ -8,7 +8,7 @@
 namespace dbr {
 namespace {
 
-// The index of a uniformly drawn legal action; -1 where none is legal.
+// Returns the index of a uniformly drawn legal action, or -1 where none is legal.
 int DrawLegal(const MatrixX<float>& masks, int column, Rng& rng) {
   int legal = 0;
   for (int k = 0; k < masks.rows(); ++k) legal += masks(k, column) > 0;
@@ -19,7 +19,7 @@ int DrawLegal(const MatrixX<float>& masks, int column, Rng& rng) {
   return k;
 }
 
-// After `steps` of all processes together.
+// Returns epsilon after `steps` steps of all processes together.
 double EpsilonAt(const ExplorationOptions& options, std::uint64_t steps) {
   if (options.epsilon_decay_steps == 0) return options.epsilon;
   const double done =

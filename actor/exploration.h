@@ -1,5 +1,5 @@
-// Random actions among the chosen ones, more of them in some environments than in others, and noise on the
-// rest.
+// Replaces some chosen actions by random ones, more in some environments than in others, and adds noise to
+// the rest.
 #pragma once
 
 #include <cstdint>
@@ -14,34 +14,37 @@
 namespace dbr {
 
 struct ExplorationOptions {
-  double epsilon = 0;  // share of uniformly random actions
+  double epsilon = 0;  // the share of uniformly random actions
   double epsilon_ladder = 0;
-  std::uint64_t epsilon_decay_steps = 0;  // of all processes together; 0: epsilon stays as it is
-  double final_epsilon = 0;               // after these
-  std::uint64_t first_step = 0;           // what all processes together had done before this one began
-  int processes = 1;                      // each is taken to be as fast as this one
-  double action_noise = 0;                // standard deviation, in units of a continuous action
+  std::uint64_t epsilon_decay_steps = 0;  // steps of all processes together; 0: epsilon is constant
+  double final_epsilon = 0;               // epsilon after these steps
+  std::uint64_t first_step = 0;           // the steps of all processes together before this one began
+  int processes = 1;        // the number of processes; each is assumed to be as fast as this one
+  double action_noise = 0;  // the standard deviation, in units of a continuous action
 
-  static ExplorationOptions Of(const ActorConfig& config);  // for one process, from the first step on
+  static ExplorationOptions Of(const ActorConfig& config);  // for one process, from the first step
 };
 
-// InvalidArgument where a config asks for exploration that the actions do not allow: noise on discrete ones.
+// Returns InvalidArgument where a config asks for exploration that the actions do not allow: noise on
+// discrete ones.
 absl::Status CheckExploration(const EnvSpec& env, const ActorConfig& config);
 
-// Environment i of n has its own share e^(1 + ladder * i / (n - 1)) of uniformly random actions: with ladder
-// 0 all have e, else the last ones nearly none (the ladder of Ape-X, Horgan et al. 2018). e goes linearly
-// from epsilon to final_epsilon. Actions that are not replaced get the noise. One thread at a time.
+// Environment i of n has the share e^(1 + ladder * i / (n - 1)) of uniformly random actions. With ladder 0
+// all environments have e; with a large ladder the last ones have nearly none (the ladder of Ape-X, Horgan et
+// al. 2018). e moves linearly from epsilon to final_epsilon. Actions that are not replaced get the noise. One
+// thread at a time.
 class Exploration {
  public:
-  // `n` environments. The options fit the actions (CheckExploration).
+  // For `n` environments. Requires options that fit the actions (CheckExploration).
   Exploration(const ActionSpace& actions, const ExplorationOptions& options, int n);
 
-  // One step of each environment: replaces columns of `actions` [width x n] by uniformly random legal ones,
-  // each with its environment's share; a continuous action by one uniform in [-1, 1]^size. To the others
-  // normal noise is added, clipped to [-1, 1]. masks [mask width x n]. Returns how many it replaced.
+  // Makes one step for each environment. It replaces columns of `actions` [width x n] by uniformly random
+  // legal ones, with each environment's share. A continuous action is replaced by one uniform in [-1,
+  // 1]^size. The others get normal noise and are clipped to [-1, 1]. masks [mask width x n]. Returns the
+  // number of replaced actions.
   int Apply(const MatrixX<float>& masks, Rng& rng, MatrixX<float>* actions);
 
-  const std::vector<double>& shares() const { return shares_; }  // [n] of the next step
+  const std::vector<double>& shares() const { return shares_; }  // [n] for the next step
 
  private:
   void SetShares();
@@ -49,7 +52,7 @@ class Exploration {
 
   const ActionSpace space_;
   const ExplorationOptions options_;
-  std::uint64_t steps_ = 0;  // of all environments of this process
+  std::uint64_t steps_ = 0;  // steps of all environments of this process
   std::vector<double> shares_;
 };
 

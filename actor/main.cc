@@ -51,7 +51,7 @@ int Fail(const absl::Status& status, int exit_code) {
   return exit_code;
 }
 
-// Connects the shutdown signals to a process's Stop and runs it to its end; gives the exit code.
+// Connects the shutdown signals to a process's Stop, runs the process to its end and returns the exit code.
 template <class Process>
 int RunProcess(const absl::StatusOr<std::unique_ptr<Process>>& process) {
   if (!process.ok()) return Fail(process.status(), absl::IsInvalidArgument(process.status()) ? 2 : 1);

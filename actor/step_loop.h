@@ -1,4 +1,4 @@
-// Acting in many environments and turning what happens into transitions.
+// Acts in many environments and makes transitions from the results.
 #pragma once
 
 #include <cstdint>
@@ -20,10 +20,11 @@ namespace dbr {
 struct StepLoopOptions {
   ActingMode mode = SAMPLE;
   ExplorationOptions exploration = {};
-  double discount = 0.99;  // of every transition that does not end in a true terminal
-  // Transitions go out when their episode has ended, with their returns and R - V(s) as first advantage.
+  double discount = 0.99;  // for every transition that does not end in a true terminal
+  // Whether transitions wait until their episode has ended and go out with their returns, and with R - V(s)
+  // as the first advantage.
   bool with_returns = false;
-  double reward_scale = 1;  // of the critics, for that advantage
+  double reward_scale = 1;  // the critics' reward scale, for that advantage
 };
 
 struct StepCounters {
@@ -33,20 +34,22 @@ struct StepCounters {
   std::uint64_t broken = 0;    // episodes cut because their world failed
 };
 
-// All environments take one step at a time; ended episodes restart with seeds drawn from `rng`, so that the
-// same rng and policies give the same transitions. Rewards go out as the environment gave them. With returns
-// an episode's transitions go out together when it has ended (EpisodeReturns). One thread at a time.
+// All environments take one step at a time. Ended episodes restart with random seeds drawn from `rng`, so
+// that the same rng and policies give the same transitions. Rewards go out in the environment's units. With
+// returns, an episode's transitions go out together when it has ended (EpisodeReturns). Owns its
+// environments. One thread at a time.
 class StepLoop {
  public:
   StepLoop(std::unique_ptr<VectorEnv> envs, const StepLoopOptions& options, const Rng& rng,
            TransitionSink sink);
 
-  // One action in each environment: one forward pass of the policy and one of each critic. Blocks as the sink
-  // does. Errors: PolicyRunner::Act's and the sink's; after an error the loop must not be used again.
+  // Takes one action in each environment, with one forward pass of the policy and one of each critic. Blocks
+  // as the sink does. Returns the errors of PolicyRunner::Act and of the sink. After an error the loop must
+  // not be used again.
   absl::Status Step(const PolicyNetworks& policy);
 
   const StepCounters& counters() const { return counters_; }
-  // Transitions of episodes that have not ended, held back for their returns.
+  // The number of transitions that are held back because their episodes have not ended.
   std::uint64_t held_back() const { return returns_.has_value() ? returns_->held() : 0; }
   const VectorEnv& envs() const { return *envs_; }
 
@@ -56,9 +59,9 @@ class StepLoop {
     int length = 0;
   };
 
-  // First advantages of the chosen actions, or with returns V(s) in their place.
+  // Computes the first advantages of the chosen actions, or with returns V(s) instead.
   void Judge(const PolicyNetworks& policy);
-  // V(s') of the environments whose episode was cut, into next_values_.
+  // Writes V(s') of the environments whose episode was cut into next_values_.
   void JudgeCuts(const PolicyNetworks& policy);
   absl::Status Emit(int i, std::uint64_t critic_version);
 
@@ -74,7 +77,7 @@ class StepLoop {
   std::vector<int> cuts_;                        // environments whose episode the newest step cut
   MatrixX<float> cut_observations_, cut_masks_;  // [observation, mask width x cuts]
   VectorX<float> cut_values_;                    // [cuts]
-  VectorX<float> next_values_;                   // [envs] V(s') of the cuts
+  VectorX<float> next_values_;                   // [envs] V(s') where the episode was cut
   std::vector<Episode> episodes_;
   StepCounters counters_;
 };

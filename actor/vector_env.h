@@ -1,4 +1,4 @@
-// Environments of one kind side by side, so that one forward pass serves them all.
+// Runs environments of one kind side by side, so that one forward pass serves them all.
 #pragma once
 
 #include <cstdint>
@@ -12,15 +12,15 @@
 
 namespace dbr {
 
-// Column i of every matrix belongs to environment i. A step writes beside the current observations, so that a
-// transition can be read from both sides before Advance() makes the next ones current. Allocates only when
-// made. One thread at a time.
+// Owns the environments. Column i of every matrix belongs to environment i. A step writes its results beside
+// the current observations, so that both sides of a transition can be read before Advance() makes the next
+// observations current. Allocates only in its constructor. One thread at a time.
 class VectorEnv {
  public:
-  // `count` environments; errors as MakeEnv's.
+  // Makes `count` environments. Returns the errors of MakeEnv.
   static absl::StatusOr<std::unique_ptr<VectorEnv>> Create(const EnvOptions& options, int count);
 
-  // At least one environment, all of the same spec (CHECKed).
+  // Takes at least one environment. All must have the same spec (CHECKed).
   explicit VectorEnv(std::vector<std::unique_ptr<Env>> envs);
 
   const EnvSpec& spec() const { return envs_.front()->spec(); }
@@ -29,12 +29,12 @@ class VectorEnv {
   // Starts an episode in environment i: overwrites column i of observations() and masks().
   void Reset(int i, std::uint64_t seed);
 
-  // Environment i takes column i of `actions` [action width x size]; writes column i of the next_ matrices.
-  // The result stays in results() until the next step.
+  // Steps environment i by column i of `actions` [action width x size]. Writes column i of the next_
+  // matrices. The result stays in results() until the next step.
   const StepResult& Step(int i, const MatrixX<float>& actions);
 
-  // The next observations and masks become the current ones. Two swaps; a column that was not stepped since
-  // the last call holds an older observation of its environment afterwards.
+  // Makes the next observations and masks the current ones. O(1): two swaps. A column that was not stepped
+  // since the last call holds an older observation of its environment afterwards.
   void Advance();
 
   const MatrixX<float>& observations() const { return observations_; }            // [observation x size]
