@@ -19,10 +19,10 @@ namespace dbr {
 namespace {
 
 constexpr int kStepsAFrame = 4;
-constexpr int kFramesANumber = 4;   // numbers change so seldom that they can be read
-constexpr int kLastFrameMs = 1500;  // to read how it ended
+constexpr int kFramesANumber = 4;   // numbers change only every fourth frame, so that they can be read
+constexpr int kLastFrameMs = 1500;  // long enough to read how the episode ended
 
-// The environments that can be filmed.
+// Returns the names of the environments that can be filmed.
 std::vector<std::string> NamesWithFigure() {
   std::vector<std::string> names;
   for (const std::string& name : EnvNames()) {

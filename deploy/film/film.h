@@ -18,8 +18,8 @@ using ChooseAction = std::function<absl::Status(absl::Span<const float> observat
                                                 absl::Span<const float> mask, absl::Span<float> action)>;
 
 struct FilmOptions {
-  std::string path;        // of the file, replaced as a whole
-  std::uint64_t seed = 0;  // of the episode
+  std::string path;        // the file, which is replaced as a whole
+  std::uint64_t seed = 0;  // the episode's random seed
 };
 
 struct FilmSummary {
@@ -29,10 +29,10 @@ struct FilmSummary {
   std::size_t bytes = 0;
 };
 
-// Plays in real time, every fourth step a frame, however long the episode. Blocks for some seconds; ends with
-// Cancelled soon after `cancelled` (may be null) becomes true. Other errors: InvalidArgument for an
-// environment without a figure, with the names of those that have one; the chooser's; WriteFileAtomically's;
-// Internal from the encoder.
+// Plays the episode and films every fourth step; the film runs at the speed of real time. Blocks for some
+// seconds. Returns Cancelled soon after `cancelled` (may be null) becomes true, InvalidArgument for an
+// environment without a figure (with the names of those that have one), Internal from the encoder, and the
+// errors of `choose` and WriteFileAtomically.
 absl::StatusOr<FilmSummary> FilmEpisode(Env& env, const ChooseAction& choose, const FilmOptions& options,
                                         const std::atomic<bool>* cancelled = nullptr);
 

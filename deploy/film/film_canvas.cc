@@ -18,14 +18,14 @@ constexpr Colour kGround{0.871, 0.855, 0.816};
 constexpr Colour kMark{0.69, 0.667, 0.612};
 constexpr Colour kInk{0.149, 0.180, 0.220};
 constexpr Colour kFaintInk{0.478, 0.486, 0.498};
-// From the trunk to the feet.
+// The colours from the trunk to the feet.
 constexpr Colour kLimbs[] = {
     {0.149, 0.275, 0.325}, {0.165, 0.616, 0.561}, {0.914, 0.769, 0.416}, {0.906, 0.435, 0.318}};
 constexpr int kLimbColours = sizeof(kLimbs) / sizeof(kLimbs[0]);
 
-constexpr double kGroundLine = 222;  // pixels from the top, where the floor is in the view from the side
-constexpr double kSlant = 0.5;       // of the view from above: sine of how far it looks down
-constexpr double kTurn = 0.45;       // rad: how far the camera stands to the front of the side
+constexpr double kGroundLine = 222;  // pixels from the top to the floor in the view from the side
+constexpr double kSlant = 0.5;       // the view from above: sine of the angle by which it looks down
+constexpr double kTurn = 0.45;       // rad: the camera's angle from the side towards the front
 
 Colour Mix(const Colour& a, const Colour& b, double share_of_b) {
   const auto mix = [share_of_b](double x, double y) { return x + share_of_b * (y - x); };
@@ -36,11 +36,12 @@ void Use(cairo_t* cairo, const Colour& colour, double opacity = 1) {
   cairo_set_source_rgba(cairo, colour.red, colour.green, colour.blue, opacity);
 }
 
-// A line with round ends; a disc where both ends are one.
+// A place in the picture, in pixels.
 struct Spot {
   double x = 0;
   double y = 0;
 };
+// Draws a line with round ends: a disc where both ends are the same.
 void Stroke(cairo_t* cairo, const Spot& from, const Spot& to, double width) {
   cairo_set_line_cap(cairo, CAIRO_LINE_CAP_ROUND);
   cairo_set_line_width(cairo, width);
@@ -61,14 +62,14 @@ void Write(cairo_t* cairo, const std::string& text, const Spot& at, double size,
   cairo_show_text(cairo, text.c_str());
 }
 
-// For one decimal.
+// Returns 0 for a value that would print as -0.0 or 0.0 with one decimal.
 double WithoutMinusZero(double value) {
   return std::abs(value) < 0.05 ? 0 : value;
 }
 
 }  // namespace
 
-// From places in the world to spots in the picture, without perspective.
+// Maps places in the world to spots in the picture, without perspective.
 class FilmCanvas::Camera {
  public:
   Camera(View view, const Point& eye, double pixels_a_metre)
@@ -81,13 +82,13 @@ class FilmCanvas::Camera {
     return {0.5 * kWidth + scale_ * right,
             0.68 * kHeight - scale_ * (kSlant * Away(p) + std::sqrt(1 - kSlant * kSlant) * p.z)};
   }
-  // How far behind the eye's place (m), along the floor.
+  // The distance behind the eye's place along the floor (m).
   double Away(const Point& p) const {
     return std::sin(kTurn) * (p.x - eye_.x) + std::cos(kTurn) * (p.y - eye_.y);
   }
   View view() const { return view_; }
   double scale() const { return scale_; }
-  // Half the width of the floor that can be seen (m), generously.
+  // Half the width of the visible floor (m), rounded up generously.
   double reach() const { return (view_ == View::kSide ? 0.5 : 1.0) * kWidth / scale_ + 1; }
   const Point& eye() const { return eye_; }
 
@@ -122,10 +123,11 @@ void FilmCanvas::Draw(const Figure& figure, const FilmCaption& caption) {
     pixels_a_metre_ = std::min(0.56 * kHeight / top, 0.26 * kWidth / reach);
     eye_ = figure.place;
   }
-  // The camera follows a little late, which shows jolts.
+  // The camera follows with a small delay, so that jolts are visible.
   eye_.x += 0.3 * (figure.place.x - eye_.x);
   eye_.y += 0.3 * (figure.place.y - eye_.y);
-  // By whole pixels, so that what stands still stays the same picture and costs nothing in the file.
+  // The camera moves by whole pixels, so that parts that stand still give the same picture and cost no bytes
+  // in the file.
   const auto whole = [this](double metres) { return std::round(metres * pixels_a_metre_) / pixels_a_metre_; };
   const Camera camera(figure.view, {whole(eye_.x), whole(eye_.y), 0}, pixels_a_metre_);
   Use(cairo_.get(), kSky);
@@ -136,7 +138,8 @@ void FilmCanvas::Draw(const Figure& figure, const FilmCaption& caption) {
   DrawCaption(caption);
 }
 
-// From the side: a mark each half metre, and the metres written under it. From above: squares of a metre.
+// View from the side: a mark at each half metre, and the metres under the marks. View from above: squares of
+// 1 m.
 void FilmCanvas::DrawFloor(const Camera& camera) {
   cairo_t* const cairo = cairo_.get();
   const auto floor_of = [](double x) { return static_cast<int>(std::floor(x)); };

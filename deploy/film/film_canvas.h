@@ -1,4 +1,4 @@
-// Draws a moment of an episode: the figure, the floor that passes under it, and how it is doing.
+// Draws one moment of an episode: the figure, the floor that passes under it, and the numbers.
 #pragma once
 
 #include <cairo.h>
@@ -11,7 +11,7 @@
 
 namespace dbr {
 
-// What is written into the picture.
+// The text in the picture.
 struct FilmCaption {
   std::string title;
   int step = 0;
@@ -20,8 +20,8 @@ struct FilmCaption {
   std::string note;  // across the picture; empty: none
 };
 
-// One picture, drawn over and over. The camera keeps beside the figure; its distance is chosen with the first
-// figure. One thread at a time.
+// One picture that is drawn again and again. The camera stays beside the figure. The first figure decides its
+// distance. Owns the picture. One thread at a time.
 class FilmCanvas {
  public:
   static constexpr int kWidth = 480;
@@ -31,8 +31,8 @@ class FilmCanvas {
 
   void Draw(const Figure& figure, const FilmCaption& caption);
 
-  // Rows of blue, green, red and an unused byte, from the top; stride_bytes() from one to the next. Until the
-  // next Draw.
+  // Rows of blue, green, red and an unused byte, from the top. stride_bytes() is the distance from one row to
+  // the next. Valid until the next Draw.
   const std::uint8_t* pixels();
   int stride_bytes() const;
 
@@ -51,7 +51,7 @@ class FilmCanvas {
   std::unique_ptr<cairo_surface_t, Free> surface_;
   std::unique_ptr<cairo_t, Free> cairo_;
   double pixels_a_metre_ = 0;  // 0 before the first figure
-  Point eye_;                  // the place in the middle of the picture
+  Point eye_;                  // the place (m) in the middle of the picture
 };
 
 }  // namespace dbr

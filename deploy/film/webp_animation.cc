@@ -5,9 +5,9 @@
 namespace dbr {
 namespace {
 
-constexpr float kQuality = 30;  // of 100; flat drawings bear it
-// What differs little from the frame before is not drawn again and leaves traces; whole frames wipe them
-// away.
+constexpr float kQuality = 30;  // of 100; enough for flat drawings
+// The encoder does not draw small differences to the frame before, which leaves traces. Whole frames remove
+// them.
 constexpr int kFramesBetweenWholeOnes = 8;
 
 }  // namespace
@@ -19,7 +19,7 @@ absl::StatusOr<std::unique_ptr<WebpAnimation>> WebpAnimation::Create(int width, 
       !WebPConfigPreset(&animation->config_, WEBP_PRESET_DEFAULT, kQuality)) {
     return absl::InternalError("the WebP library is of another version than its headers");
   }
-  options.anim_params.loop_count = 0;  // for ever
+  options.anim_params.loop_count = 0;  // repeat without end
   options.kmin = kFramesBetweenWholeOnes - 1;
   options.kmax = kFramesBetweenWholeOnes;
   animation->encoder_.reset(WebPAnimEncoderNew(width, height, &options));

@@ -1,4 +1,4 @@
-// An animated WebP picture, built frame by frame.
+// Builds an animated WebP picture frame by frame.
 #pragma once
 
 #include <webp/encode.h>
@@ -13,16 +13,16 @@
 
 namespace dbr {
 
-// Plays for ever. One thread at a time. Errors: Internal, with what the encoder said.
+// The animation repeats without end. One thread at a time. All errors are Internal, with the encoder's words.
 class WebpAnimation {
  public:
   static absl::StatusOr<std::unique_ptr<WebpAnimation>> Create(int width, int height);
 
-  // A frame to be seen from `start_ms` on, later than the one before. `pixels`: rows of blue, green, red and
-  // an unused byte, each stride_bytes from the one before.
+  // Adds a frame that is shown from `start_ms` on. start_ms must be later than that of the frame before.
+  // `pixels` has rows of blue, green, red and an unused byte, with stride_bytes from one row to the next.
   absl::Status Add(const std::uint8_t* pixels, int stride_bytes, int start_ms);
 
-  // The whole file; the last frame is seen until `end_ms`. Nothing can be added afterwards.
+  // Returns the whole file. The last frame is shown until `end_ms`. Nothing can be added afterwards.
   absl::StatusOr<std::string> Finish(int end_ms);
 
  private:
