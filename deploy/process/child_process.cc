@@ -17,11 +17,12 @@ namespace {
 
 constexpr int kCannotExec = 127;
 
-// The child's side of the fork. Async-signal-safe calls alone: the parent may have other threads by now.
+// The child's side of the fork. It makes only async-signal-safe calls, because the parent may have other
+// threads by now.
 [[noreturn]] void RunChild(char* const* arguments, pid_t parent, pid_t group, int log, int kept_fd) {
   prctl(PR_SET_PDEATHSIG, SIGTERM);
-  if (getppid() != parent) _exit(kCannotExec);  // it died before the line above
-  // A group that a terminal's Ctrl-C does not reach: the launcher stops its children in order.
+  if (getppid() != parent) _exit(kCannotExec);  // the parent died before the line above
+  // A terminal's Ctrl-C does not reach this group. The launcher stops its children in order.
   if (setpgid(0, group) != 0) setpgid(0, 0);
   sigset_t blocked;
   sigemptyset(&blocked);

@@ -26,7 +26,7 @@
 namespace dbr {
 namespace {
 
-// The program of that name in the folders of PATH.
+// Finds gnuplot in the folders of PATH.
 absl::StatusOr<std::string> FindGnuplot() {
   const char* path = std::getenv("PATH");
   for (const absl::string_view folder : absl::StrSplit(path == nullptr ? "" : path, ':', absl::SkipEmpty())) {
@@ -37,7 +37,7 @@ absl::StatusOr<std::string> FindGnuplot() {
       "gnuplot is not installed, and plots need it: apt-get install gnuplot-nox");
 }
 
-// Blocks until the process behind `pidfd` has ended; false where the deadline came first.
+// Blocks until the process of `pidfd` has ended. Returns false where the deadline came first.
 bool WaitForEnd(int pidfd, absl::Duration deadline) {
   const absl::Time end = absl::Now() + deadline;
   for (;;) {
@@ -57,7 +57,7 @@ absl::Status RunGnuplot(absl::string_view script, const std::string& folder, abs
   ASSIGN_OR_RETURN(const StartedChild child, StartChild({.command = {program, script_path}, .log = log}));
   std::atomic<bool> interrupted = false;
   bool in_time = false;
-  // By number: glibc 2.36 declares pidfd_open() for C alone.
+  // The call is made by its number because glibc 2.36 declares pidfd_open() for C alone.
   const int pidfd = static_cast<int>(syscall(SYS_pidfd_open, child.pid, 0));
   if (pidfd >= 0) {
     const absl::Cleanup close_pidfd = [pidfd] { close(pidfd); };

@@ -1,4 +1,4 @@
-// Drawing by gnuplot.
+// Draws plots by gnuplot.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace dbr {
 
-// Runs gnuplot over `script`, which is written to `folder`/plots.gp with gnuplot's own words beside it in
-// plots.log; both are removed when all went well. Blocks until it has ended, at most `deadline` long. No
-// shell takes part. FailedPrecondition where gnuplot is not installed, saying how to install it; Internal
-// with its last words where it failed; DeadlineExceeded; Cancelled after SIGINT or SIGTERM, which the
-// caller's threads block (core/shutdown.h); and what writing a file can give.
+// Runs gnuplot on `script`. Writes the script to `folder`/plots.gp and gnuplot's output to plots.log beside
+// it, and removes both on success. Blocks until gnuplot has ended, at most for `deadline`. Uses no shell.
+// Returns FailedPrecondition where gnuplot is not installed, with how to install it; Internal with its last
+// words where it failed; DeadlineExceeded; Cancelled after SIGINT or SIGTERM, which the caller's threads must
+// block (core/shutdown.h); and the errors of writing a file.
 absl::Status RunGnuplot(absl::string_view script, const std::string& folder, absl::Duration deadline);
 
 }  // namespace dbr

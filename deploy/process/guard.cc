@@ -16,7 +16,7 @@
 namespace dbr {
 namespace {
 
-// Waits until nobody holds the other end of the pipe. False after the timeout.
+// Blocks until nobody holds the other end of the pipe. Returns false after the timeout.
 bool WaitForHangup(int fd, int timeout_ms) {
   pollfd waiting = {fd, 0, 0};  // POLLHUP is always reported
   for (;;) {
@@ -26,7 +26,7 @@ bool WaitForHangup(int fd, int timeout_ms) {
   }
 }
 
-// The guard's whole life. Async-signal-safe calls alone: it runs in a fork.
+// The guard's whole life. It makes only async-signal-safe calls, because it runs in a fork.
 [[noreturn]] void RunGuard(const std::array<int, 2>& launcher, const std::array<int, 2>& children,
                            int grace_ms) {
   close(launcher[1]);
@@ -38,7 +38,7 @@ bool WaitForHangup(int fd, int timeout_ms) {
   sigprocmask(SIG_SETMASK, &all, nullptr);
   const int null = open("/dev/null", O_RDWR);
   for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) dup2(null, fd);
-  // Whatever else the launcher has open (its own output above all) must not stay open here.
+  // Everything else that the launcher has open, its own output above all, must not stay open here.
   const int low = std::min(launcher[0], children[0]);
   const int high = std::max(launcher[0], children[0]);
   close_range(3, low - 1, 0);
@@ -69,7 +69,7 @@ absl::StatusOr<std::unique_ptr<Guard>> Guard::Start(absl::Duration grace) {
     close(children[1]);
     return ErrnoStatus(error_number, "cannot fork", "the guard");
   }
-  setpgid(pid, pid);  // the guard does so too; whoever comes first
+  setpgid(pid, pid);  // the guard does so too: either may be first
   return std::unique_ptr<Guard>(new Guard(pid, launcher[1], children[1]));
 }
 

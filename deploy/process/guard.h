@@ -1,4 +1,4 @@
-// The process that ends what is left when the launcher itself is killed.
+// A process that ends the remaining children when the launcher itself is killed.
 #pragma once
 
 #include <sys/types.h>
@@ -10,19 +10,24 @@
 
 namespace dbr {
 
-// A small forked process that leads the process group of all children. Children get SIGTERM from the kernel
-// when the launcher dies (PR_SET_PDEATHSIG); the guard gives them `grace` to end and then kills the group, so
-// that a child that hangs is no orphan either. One thread at a time. Start it before the process has other
-// threads.
+// A small forked process that leads the process group of all children. When the launcher dies, the kernel
+// sends SIGTERM to the children (PR_SET_PDEATHSIG). The guard gives them `grace` to end and then kills the
+// group, so that not even a child that hangs survives. One thread at a time.
+//
+//   launcher ---- pipe ---- guard ---- pipe ---- every child
+//
+// The launcher's end closes when it dies. The children's end closes when the last of them has ended.
 class Guard {
  public:
+  // Starts the guard. Requires that the process has no other threads yet. Returns an error where a pipe or
+  // the process cannot be made.
   static absl::StatusOr<std::unique_ptr<Guard>> Start(absl::Duration grace);
-  ~Guard();  // lets the guard end and waits for it; every child has ended before
+  ~Guard();  // ends the guard and blocks until it has ended; every child must have ended before
   Guard(const Guard&) = delete;
   Guard& operator=(const Guard&) = delete;
 
   pid_t group() const { return pid_; }
-  // To be kept open by every child over its exec; the guard reads the end of all children from it.
+  // Every child must keep this open over its exec. Its closing tells the guard that all children have ended.
   int child_fd() const { return child_fd_; }
 
  private:
@@ -30,7 +35,7 @@ class Guard {
       : pid_(pid), launcher_fd_(launcher_fd), child_fd_(child_fd) {}
 
   pid_t pid_;
-  int launcher_fd_;  // closed by the kernel when the launcher dies
+  int launcher_fd_;  // the kernel closes it when the launcher dies
   int child_fd_;
 };
 

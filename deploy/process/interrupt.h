@@ -1,4 +1,4 @@
-// Ctrl-C in a command that has nothing to save.
+// Handles Ctrl-C in a command that has nothing to save.
 #pragma once
 
 #include <atomic>
@@ -10,17 +10,17 @@
 
 namespace dbr {
 
-// The exit status of a command that was interrupted, as shells have it.
+// The exit status of an interrupted command, as shells use it.
 inline constexpr int kInterruptedExit = 130;
 
-// Remembers SIGINT and SIGTERM from its construction on; BlockShutdownSignals() comes first. Thread-safe.
+// Remembers SIGINT and SIGTERM from its construction on. Requires BlockShutdownSignals() before. Thread-safe.
 class Interrupt {
  public:
   Interrupt() : watcher_([this] { Set(); }) {}
 
   const std::atomic<bool>& flag() const { return flag_; }
 
-  // Blocks for `duration` or until the signal; true where it came.
+  // Blocks for `duration` or until a signal. Returns whether a signal came.
   bool WaitFor(absl::Duration duration) {
     absl::MutexLock lock(&mutex_);
     return mutex_.AwaitWithTimeout(absl::Condition(&set_), duration);

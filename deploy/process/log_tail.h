@@ -1,4 +1,4 @@
-// The last words of a process.
+// Reads the last lines of a process's log.
 #pragma once
 
 #include <sys/types.h>
@@ -9,8 +9,8 @@
 
 namespace dbr {
 
-// The last `lines` lines of `path` behind `start`, each indented by four spaces; empty where there is nothing
-// to read.
+// Returns the last `lines` lines of the file `path` after the offset `start` (bytes), each indented by four
+// spaces. Empty where there is nothing to read. Reads the file; blocks for that.
 std::string LogTail(const std::string& path, off_t start, int lines = 5);
 
 }  // namespace dbr

@@ -35,11 +35,11 @@ sigset_t WatchedSignals() {
 
 struct Supervisor::Child {
   ProcessSpec spec;
-  pid_t pid = 0;                  // 0: does not run
-  std::optional<int> ended = {};  // with `once`: how
-  off_t log_start = 0;            // where the log of this start begins
+  pid_t pid = 0;                  // 0: it does not run
+  std::optional<int> ended = {};  // with `once`: the wait status of its end
+  off_t log_start = 0;            // the offset in the log where this start begins
   absl::Time restart_at = absl::InfiniteFuture();
-  std::deque<absl::Time> restarts;  // within the window
+  std::deque<absl::Time> restarts;  // the times of restarts within the window
 };
 
 absl::StatusOr<std::unique_ptr<Supervisor>> Supervisor::Create(SupervisorOptions options) {
@@ -91,7 +91,7 @@ absl::Status Supervisor::Spawn(Child* child, bool again) {
   return absl::OkStatus();
 }
 
-// To follow the news of its end.
+// Returns the text that follows the message of a child's end.
 std::string Supervisor::LastWords(const Child& child) {
   const std::string lines = LogTail(child.spec.log, child.log_start);
   return lines.empty() ? ", saying nothing" : absl::StrCat(", its last lines:\n", lines);
@@ -109,7 +109,7 @@ void Supervisor::Wake() {
   [[maybe_unused]] const ssize_t n = write(wake_fd_, &one, sizeof one);  // full: it is awake already
 }
 
-// Blocks until something happens or `deadline`, and takes the signals that came.
+// Blocks until `deadline` or an event, and reads the signals that came.
 void Supervisor::Poll(absl::Time deadline) {
   const absl::Duration left = std::clamp(deadline - absl::Now(), absl::ZeroDuration(), absl::Hours(1));
   pollfd fds[2] = {{signal_fd_, POLLIN, 0}, {wake_fd_, POLLIN, 0}};
@@ -118,7 +118,7 @@ void Supervisor::Poll(absl::Time deadline) {
   [[maybe_unused]] const ssize_t n = read(wake_fd_, &wakes, sizeof wakes);
   signalfd_siginfo info;
   while (read(signal_fd_, &info, sizeof info) == sizeof info) {
-    // A terminal that goes away asks to stop, but is not impatient.
+    // A terminal that closes asks for a stop. A second request from it is not impatience.
     const bool hangup_again = info.ssi_signo == SIGHUP && stop_signals_ > 0;
     if (info.ssi_signo != SIGCHLD && !hangup_again) ++stop_signals_;
   }
@@ -152,7 +152,7 @@ std::vector<EndedProcess> Supervisor::TakeEnded() {
   return ended;
 }
 
-// Plans the restart of a child that died, or says why there is none.
+// Plans the restart of a child that died. Returns the reason where there is none.
 absl::Status Supervisor::OnDeath(Child* child, int wait_status) {
   const ProcessSpec& spec = child->spec;
   child->pid = 0;
@@ -243,7 +243,7 @@ bool Supervisor::StopRank(int rank) {
   return clean;
 }
 
-// Takes the children of a rank that have ended; true while one is still there.
+// Reaps the children of a rank that have ended. Returns true while one still runs.
 bool Supervisor::ReapStopped(int rank, bool* clean) {
   bool running = false;
   for (const auto& child : children_) {
@@ -260,7 +260,7 @@ bool Supervisor::ReapStopped(int rank, bool* clean) {
     child->pid = 0;
     if (status == 0) continue;
     *clean = false;
-    // It may have failed by itself just before, and be why the others did.
+    // It may have failed by itself just before, and be the reason why the others failed.
     options_.on_event(absl::StrCat(child->spec.name, " ", DescribeExit(status), " when it was stopped",
                                    WIFEXITED(status) ? LastWords(*child) : ""),
                       /*notable=*/true);
