@@ -2,12 +2,12 @@
 
 #include <regex>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "absl/strings/str_replace.h"
 #include "absl/strings/str_split.h"
-#include "absl/strings/strip.h"
 
 namespace dbr {
 namespace {
@@ -26,10 +26,19 @@ std::vector<std::string> FirstGroups(const std::string& text, const std::regex& 
   return found;
 }
 
+std::string WithoutIndent(const std::string& line) {
+  return std::string(absl::StripLeadingAsciiWhitespace(line));
+}
+
 // The line up to a " #" or a "#" at its start.
 std::string WithoutComment(const std::string& line) {
   if (absl::StartsWith(line, "#")) return "";
   return line.substr(0, line.find(" #"));
+}
+
+// Blocks within a list are indented.
+bool IsFenceLine(const std::string& line) {
+  return absl::StartsWith(WithoutIndent(line), kFence);
 }
 
 }  // namespace
@@ -45,9 +54,9 @@ std::vector<Fence> Fences(const std::string& page) {
   int number = 0;
   for (const std::string& line : Lines(page)) {
     ++number;
-    if (absl::StartsWith(line, kFence)) {
+    if (IsFenceLine(line)) {
       if (!inside) {
-        const std::string info = line.substr(sizeof kFence - 1);
+        const std::string info = WithoutIndent(line).substr(sizeof kFence - 1);
         fences.push_back({number, absl::StrSplit(info, ' ', absl::SkipEmpty()), ""});
       }
       inside = !inside;
@@ -62,7 +71,7 @@ std::string Prose(const std::string& page) {
   std::vector<std::string> lines = Lines(page);
   bool inside = false;
   for (std::string& line : lines) {
-    const bool fence = absl::StartsWith(line, kFence);
+    const bool fence = IsFenceLine(line);
     if (fence) inside = !inside;
     if (fence || inside) line.clear();
   }
@@ -86,8 +95,8 @@ std::vector<std::string> Commands(const std::string& shell) {
   const std::string joined = absl::StrReplaceAll(shell, {{"\\\n", " "}});
   std::vector<std::string> commands;
   for (const std::string& line : Lines(joined)) {
-    const std::string command = WithoutComment(line);
-    if (!absl::StripAsciiWhitespace(command).empty()) commands.push_back(command);
+    const std::string command = WithoutComment(WithoutIndent(line));
+    if (!command.empty()) commands.push_back(command);
   }
   return commands;
 }
