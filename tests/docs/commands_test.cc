@@ -1,6 +1,7 @@
-// The commands in our pages. In README.md and docs/tutorial.md the blocks that begin with "```sh test" are run as
-// they stand, in the page's order; the files named behind "test" must be there when the page is through. In all
-// pages the other commands of dbr are looked up: subcommand, flags, and the files of deploy that they name.
+// The commands in our pages. In README.md and docs/tutorial.md the blocks that begin with "```sh test" are
+// run as they stand, in the page's order; the files named behind "test" must be there when the page is
+// through. In all pages the other commands of dbr are looked up: subcommand, flags, and the files of deploy
+// that they name.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -60,7 +61,8 @@ struct Called {
 };
 
 bool EndsACommand(const std::string& word) {
-  return word == "&" || word == "&&" || word == "|" || absl::StartsWith(word, ">") || absl::StartsWith(word, "2>");
+  return word == "&" || word == "&&" || word == "|" || absl::StartsWith(word, ">") ||
+         absl::StartsWith(word, "2>");
 }
 
 Called Parse(const std::string& command) {
@@ -92,11 +94,25 @@ const std::string& HelpOf(const Called& called) {
 }
 
 bool KnowsFlag(const std::string& help, const std::string& flag) {
-  return absl::StrContains(help, absl::StrCat(" ", flag, " ")) || absl::StrContains(help, absl::StrCat(",", flag, " "));
+  return absl::StrContains(help, absl::StrCat(" ", flag, " ")) ||
+         absl::StrContains(help, absl::StrCat(",", flag, " "));
 }
 
+// `build/bin/dbr ...` or the like; dbr-bench is Google Benchmark's.
 bool IsOurs(const std::string& command) {
-  return absl::StartsWith(command, "build/bin/dbr");
+  return absl::StartsWith(command, "build/bin/dbr") && !absl::StartsWith(command, "build/bin/dbr-bench");
+}
+
+void ExpectIsKnown(const std::string& command, const std::string& where) {
+  const Called called = Parse(command);
+  const std::string& help = HelpOf(called);
+  const std::string usage =
+      absl::StrCat(called.program, called.subcommand.empty() ? "" : " ", called.subcommand, " [OPTIONS]");
+  EXPECT_TRUE(absl::StrContains(help, usage)) << where << ": there is no such command: " << command;
+  for (const std::string& flag : called.flags)
+    EXPECT_TRUE(KnowsFlag(help, flag)) << where << ": there is no flag " << flag << ": " << command;
+  for (const std::string& file : called.files)
+    EXPECT_TRUE(std::filesystem::exists(InTree(file))) << where << ": there is no " << file;
 }
 
 TEST(CommandsTest, SubcommandsFlagsAndFilesOfAllPagesExist) {
@@ -106,19 +122,11 @@ TEST(CommandsTest, SubcommandsFlagsAndFilesOfAllPagesExist) {
       for (const std::string& command : Commands(fence.text)) {
         if (absl::StartsWith(command, "deploy/")) {
           const std::string script = command.substr(0, command.find(' '));
-          EXPECT_TRUE(std::filesystem::exists(InTree(script))) << where << ": " << command;
+          EXPECT_TRUE(std::filesystem::exists(InTree(script))) << where << ": there is no " << script;
         }
-        if (!IsOurs(command) || absl::StartsWith(command, "build/bin/dbr-bench")) continue;
+        if (!IsOurs(command)) continue;
         EXPECT_TRUE(fence.IsShell()) << where << ": expected ```sh before commands";
-        const Called called = Parse(command);
-        const std::string& help = HelpOf(called);
-        EXPECT_TRUE(absl::StrContains(help, absl::StrCat(called.program, called.subcommand.empty() ? "" : " ",
-                                                         called.subcommand, " [OPTIONS]")))
-            << where << ": there is no such subcommand: " << command;
-        for (const std::string& flag : called.flags)
-          EXPECT_TRUE(KnowsFlag(help, flag)) << where << ": " << flag << " is no flag of: " << command;
-        for (const std::string& file : called.files)
-          EXPECT_TRUE(std::filesystem::exists(InTree(file))) << where << ": there is no " << file;
+        ExpectIsKnown(command, where);
       }
     }
   }

@@ -19,7 +19,8 @@ namespace {
 // arguments side by side, "a", "b", becomes one text too.
 std::string WithTextsJoined(const std::string& source) {
   static const std::regex kSeam("\"\\s*,?\\s*\"");
-  const std::string marked = absl::StrReplaceAll(source, {{"\\\"", "\x01"}});  // so that no seam begins at a quoted "
+  const std::string marked =
+      absl::StrReplaceAll(source, {{"\\\"", "\x01"}});  // so that no seam begins at a quoted "
   return absl::StrReplaceAll(std::regex_replace(marked, kSeam, ""), {{"\x01", "\""}});
 }
 
@@ -54,7 +55,8 @@ TEST(TroubleshootingTest, EachQuotedMessageStandsInOneSource) {
 }
 
 TEST(TroubleshootingTest, ATextOverSeveralLinesIsFound) {
-  EXPECT_EQ(WithTextsJoined("Error(\"one \"\n    \"text, \\\"quoted\\\"\")"), "Error(\"one text, \"quoted\"\")");
+  EXPECT_EQ(WithTextsJoined("Error(\"one \"\n    \"text, \\\"quoted\\\"\")"),
+            "Error(\"one text, \"quoted\"\")");
 }
 
 }  // namespace

@@ -21,7 +21,8 @@ inline std::string ReadPage(const std::string& path) {
 }
 
 // Files below `folder` with one of these endings (".md"), by their paths within the tree.
-inline std::vector<std::string> FilesBelow(const std::string& folder, const std::vector<std::string>& endings) {
+inline std::vector<std::string> FilesBelow(const std::string& folder,
+                                           const std::vector<std::string>& endings) {
   std::vector<std::string> paths;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(InTree(folder))) {
     for (const std::string& ending : endings) {
