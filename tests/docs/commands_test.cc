@@ -2,6 +2,7 @@
 // run as they stand, in the page's order; the files named behind "test" must be there when the page is
 // through. In all pages the other commands of dbr are looked up: subcommand, flags, and the files of deploy
 // that they name.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -132,14 +133,23 @@ TEST(CommandsTest, SubcommandsFlagsAndFilesOfAllPagesExist) {
   }
 }
 
-TEST(PagesTest, LinksLeadToFilesOfTheTree) {
+// A link is PATH, PATH#HEADING or #HEADING.
+void ExpectLeadsSomewhere(const std::string& target, const std::string& page) {
+  const std::pair<std::string, std::string> link = absl::StrSplit(target, absl::MaxSplits('#', 1));
+  const std::filesystem::path folder = std::filesystem::path(page).parent_path();
+  const std::string path = link.first.empty() ? page : (folder / link.first).lexically_normal().string();
+  EXPECT_TRUE(std::filesystem::exists(InTree(path)))
+      << page << " links to " << target << ", which is not there";
+  if (!link.second.empty() && absl::EndsWith(path, ".md")) {
+    EXPECT_THAT(Anchors(ReadPage(path)), testing::Contains(link.second))
+        << page << " links to a heading that is not there";
+  }
+}
+
+TEST(PagesTest, LinksLeadToFilesAndHeadingsOfTheTree) {
   for (const std::string& page : AllPages()) {
-    for (const std::string& target : LinkTargets(ReadPage(page))) {
-      if (absl::StrContains(target, "://") || absl::StartsWith(target, "#")) continue;
-      const std::filesystem::path file =
-          std::filesystem::path(InTree(page)).parent_path() / target.substr(0, target.find('#'));
-      EXPECT_TRUE(std::filesystem::exists(file)) << page << " links to " << target << ", which is not there";
-    }
+    for (const std::string& target : LinkTargets(ReadPage(page)))
+      if (!absl::StrContains(target, "://")) ExpectLeadsSomewhere(target, page);
   }
 }
 

@@ -1,5 +1,6 @@
 #include "tests/docs/markdown.h"
 
+#include <algorithm>
 #include <regex>
 
 #include "absl/strings/ascii.h"
@@ -80,6 +81,20 @@ std::string Prose(const std::string& page) {
 
 std::vector<std::string> LinkTargets(const std::string& page) {
   return FirstGroups(Prose(page), std::regex(R"(\]\(([^)\s]+)\))"));
+}
+
+std::vector<std::string> Anchors(const std::string& page) {
+  std::vector<std::string> anchors;
+  for (const std::string& line : Lines(Prose(page))) {
+    if (!absl::StartsWith(line, "#")) continue;
+    std::string anchor;
+    for (const char c : line.substr(std::min(line.size(), line.find_first_not_of("# ")))) {
+      if (absl::ascii_isalnum(c) || c == '-' || c == '_') anchor.push_back(absl::ascii_tolower(c));
+      if (c == ' ') anchor.push_back('-');
+    }
+    anchors.push_back(anchor);
+  }
+  return anchors;
 }
 
 std::vector<std::string> QuotedInHeadings(const std::string& page) {

@@ -26,6 +26,9 @@ std::string Prose(const std::string& page);
 // Targets of links and pictures, [words](target), outside of fenced blocks.
 std::vector<std::string> LinkTargets(const std::string& page);
 
+// What a link to a heading says behind its '#', as GitHub makes it: "## Exit codes" is "exit-codes".
+std::vector<std::string> Anchors(const std::string& page);
+
 // What stands between backticks in headings: "## `message`".
 std::vector<std::string> QuotedInHeadings(const std::string& page);
 
