@@ -116,6 +116,16 @@ void ExpectIsKnown(const std::string& command, const std::string& where) {
     EXPECT_TRUE(std::filesystem::exists(InTree(file))) << where << ": there is no " << file;
 }
 
+// cmake --preset NAME, as often as it stands in the command.
+void ExpectPresetsExist(const std::string& command, const std::string& where) {
+  const std::vector<std::string> words = absl::StrSplit(command, ' ', absl::SkipEmpty());
+  for (std::size_t i = 0; i + 1 < words.size(); ++i) {
+    if (words[i] != "--preset") continue;
+    EXPECT_TRUE(absl::StrContains(ReadPage("CMakePresets.json"), absl::StrCat("\"", words[i + 1], "\"")))
+        << where << ": there is no preset " << words[i + 1];
+  }
+}
+
 TEST(CommandsTest, SubcommandsFlagsAndFilesOfAllPagesExist) {
   for (const std::string& page : AllPages()) {
     for (const Fence& fence : Fences(ReadPage(page))) {
@@ -125,6 +135,7 @@ TEST(CommandsTest, SubcommandsFlagsAndFilesOfAllPagesExist) {
           const std::string script = command.substr(0, command.find(' '));
           EXPECT_TRUE(std::filesystem::exists(InTree(script))) << where << ": there is no " << script;
         }
+        if (absl::StartsWith(command, "cmake ")) ExpectPresetsExist(command, where);
         if (!IsOurs(command)) continue;
         EXPECT_TRUE(fence.IsShell()) << where << ": expected ```sh before commands";
         ExpectIsKnown(command, where);
