@@ -25,6 +25,10 @@ case "$1" in
              evaluation.every_s=1 evaluation.episodes=1 evaluation.final_episodes=5)
     case " $* " in *' --seed-buffer '*) shorter+=(learner.offline_updates=20) ;; esac
     exec "$dbr" "$@" "${shorter[@]/#/--set=}" ;;
+  dataset)
+    words=("$@")
+    for i in "${!words[@]}"; do [ "${words[i]}" = --steps ] && words[i + 1]=5000; done
+    set -- "${words[@]}" ;;
   stats)
     for attempt in {1..120}; do
       "$dbr" "$@" > stats.try 2>&1 && break

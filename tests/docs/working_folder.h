@@ -9,9 +9,11 @@
 namespace dbr {
 
 // A folder of its own in which `build/bin` and `deploy` are there as in a built tree. The programs are the
-// real ones, but for two commands of build/bin/dbr, which take minutes for a reader and must not for a test:
-//   launch: the same command with shorter limits behind it (kWrapper in the .cc says which);
-//   stats:  asks again until the run answers that the command before has just started.
+// real ones, but for three commands of build/bin/dbr, which take minutes for a reader and must not for a test
+// (kWrapper in the .cc):
+//   launch:         the same command with shorter limits behind it;
+//   dataset record: 5,000 steps in place of what --steps says;
+//   stats:          asks again until the run answers that the command before has just started.
 // Made for one test; one thread.
 class WorkingFolder {
  public:
