@@ -71,7 +71,8 @@ struct BehaviorConstraint {
 
 // Returns BEAR's policy loss, -E[min_i sum_a pi Q_i] / scale - w H(pi) + alpha * (D(pi, beta) - c)
 // (docs/algorithms.md). Sets `d_logits` [actions x n] to its gradient with respect to the policy's logits.
-// Everything but the policy is a constant, also normalize_q's scale (the mean of |Q| over the batch).
+// Everything but the policy is a constant. So is the scale: with normalize_q the mean over the batch of sum_a
+// pi |Q_i| with the smaller twin Q_i, at least 1e-6; else 1.
 template <class Scalar>
 ConstrainedLoss<Scalar> ConstrainedPolicyLoss(const PolicyLossOptions& options,
                                               const ValuedPolicy<Scalar>& at,
