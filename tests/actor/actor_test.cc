@@ -1,4 +1,4 @@
-// The actor between a real replay server and the learner's side of the wire, over unix sockets.
+// Tests the actor with a real replay server and a double of the learner, over unix sockets.
 #include "actor/actor.h"
 
 #include <cmath>
@@ -21,12 +21,12 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-constexpr absl::Duration kLong = absl::Seconds(30);  // reached only where something is wrong
+constexpr absl::Duration kLong = absl::Seconds(30);  // reached only where a test fails
 
-// As many transitions are drawn as are inserted, so that a draw is a way to wait for inserts.
+// As many transitions are drawn as are inserted, so that a test can wait for inserts by drawing.
 constexpr int kDrawn = 1000;
 
-// Runs an actor in a thread of its own, to be stopped and joined however the test ends.
+// Runs an actor in a thread of its own. Stops and joins it at the end of the test, also when the test fails.
 class RunningActor {
  public:
   explicit RunningActor(Actor* actor) : actor_(actor), thread_([this] { status_ = actor_->Run(); }) {}
@@ -34,7 +34,7 @@ class RunningActor {
     if (thread_.joinable()) Stop().IgnoreError();
   }
 
-  // Stops it while `meanwhile` runs; gives what Run gave.
+  // Stops the actor while `meanwhile` runs. Returns the status of Run.
   absl::Status Stop(const std::function<void()>& meanwhile = [] {}) {
     actor_->Stop();
     meanwhile();
@@ -81,7 +81,7 @@ class ActorTest : public ::testing::Test {
         .value();
   }
 
-  // Draws until `inserted` transitions have come; false where that takes too long.
+  // Draws until `inserted` transitions have come. Returns false where that takes too long.
   bool AwaitInserted(std::uint64_t inserted) {
     DrawnBatches drawn;
     const TransitionLayout layout = TransitionLayout::Of(Connect4Spec());
@@ -95,8 +95,8 @@ class ActorTest : public ::testing::Test {
     return true;
   }
 
-  // Lets what an actor still holds through the limiter: one draw makes room for more than it may buffer, and
-  // where the draw has to wait there is room already.
+  // Lets the limiter accept the transitions that an actor still holds: one draw makes room for more than the
+  // actor may buffer. Where the draw must wait, there is room already.
   void MakeRoom() {
     DrawnBatches drawn;
     const absl::Status status =
@@ -104,7 +104,7 @@ class ActorTest : public ::testing::Test {
     EXPECT_TRUE(status.ok() || absl::IsDeadlineExceeded(status)) << status;
   }
 
-  // What the server holds of one writer that has written `written`: each once.
+  // Expects that the server holds each of the `written` transitions of one writer once.
   static void ExpectEachOnce(const BufferStats& stats, std::uint64_t written) {
     ASSERT_THAT(stats.writers, SizeIs(1));
     EXPECT_EQ(stats.total, written);
@@ -143,8 +143,8 @@ TEST_F(ActorTest, AllThatTheStepLoopSaysArrivesOnce) {
                   if (end.has_value()) returns += end->episode_return;
                   return writer.Append(transition, advantage, version, end, kLong);
                 });
-  // The critics come later, as in an algorithm that starts without them. Fewer than the 1,000 episodes that
-  // stats cover.
+  // The critics come later, as in an algorithm that starts without them. The episodes are fewer than the
+  // 1,000 that the statistics cover.
   const auto blind = UntrainedPolicy(env, 1, /*with_critics=*/false), judging = UntrainedPolicy(env, 2);
   for (int step = 0; step < 200; ++step) ASSERT_TRUE(loop.Step(step < 50 ? *blind : *judging).ok());
   ASSERT_TRUE(writer.Flush(kLong).ok());
@@ -180,7 +180,7 @@ TEST_F(ActorTest, WritesUntilItIsStoppedAndLeavesNothingBehind) {
   EXPECT_NEAR(stats.recent_return_mean, 2 * stats.recent_score_mean - 1, 1e-9);
 }
 
-// Connect-4 pays at the end alone, and an episode has at most 21 moves of the agent's.
+// Connect-4 gives a reward only at the end, and an episode has at most 21 moves of the agent.
 TEST_F(ActorTest, TransitionsArriveWithTheirReturnsWhereTheAdvantageIsTheirs) {
   config_.mutable_algorithm()->mutable_dbr()->set_advantage(DbrConfig::SIL);
   config_.mutable_algorithm()->set_discount(0.5);
@@ -200,7 +200,7 @@ TEST_F(ActorTest, TransitionsArriveWithTheirReturnsWhereTheAdvantageIsTheirs) {
     if (drawn.uniform.discounts[i] == 0) {
       ASSERT_EQ(value, drawn.uniform.rewards[i]);
     } else if (value != 0) {
-      const float moves = -std::log2(std::abs(value));  // to the last one
+      const float moves = -std::log2(std::abs(value));  // the number of moves to the last one
       ASSERT_EQ(moves, std::round(moves));
       ASSERT_TRUE(moves >= 1 && moves <= 20) << value;
       ++paid;
@@ -213,7 +213,7 @@ TEST_F(ActorTest, TransitionsArriveWithTheirReturnsWhereTheAdvantageIsTheirs) {
   ExpectEachOnce(server->buffer().Stats(), actor->counters().appended);
 }
 
-// What the whole way from a step to a draw makes of an episode, cut ones too, over a real socket.
+// Follows episodes, cut ones too, on the whole way from a step to a draw, over a real socket.
 TEST_F(ActorTest, ADrawnReturnIsThatOfItsEpisode) {
   const EnvSpec env = LineEnv().spec();
   config_.mutable_algorithm()->mutable_dbr()->set_advantage(DbrConfig::SIL);
@@ -232,7 +232,7 @@ TEST_F(ActorTest, ADrawnReturnIsThatOfItsEpisode) {
   DrawnBatches drawn;
   ASSERT_TRUE(client_->Sample({.uniform = 5000}, layout, kLong, &drawn).ok());
   EXPECT_EQ(drawn.total_size + loop.held_back(), 1000u);
-  // Keys follow the order in which rows came in: an episode's are neighbours.
+  // Keys follow the order of the inserts, so an episode's rows have neighbouring keys.
   std::map<std::uint64_t, int> column_of;
   const Batch& rows = drawn.uniform;
   for (int i = 0; i < rows.size(); ++i) column_of[rows.keys[i]] = i;
@@ -252,7 +252,7 @@ TEST_F(ActorTest, ADrawnReturnIsThatOfItsEpisode) {
       behind = rows.returns[next->second];
     }
     const double expected = rows.rewards[i] + rows.discounts[i] * behind;
-    EXPECT_NEAR(rows.returns[i], expected, 1e-6 * (1 + std::abs(expected)));  // of a float's digits
+    EXPECT_NEAR(rows.returns[i], expected, 1e-6 * (1 + std::abs(expected)));  // the precision of a float
     ++compared;
   }
   EXPECT_GT(compared, 800);

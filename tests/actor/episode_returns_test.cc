@@ -29,7 +29,7 @@ class EpisodeReturnsTest : public ::testing::Test {
         });
   }
 
-  // A step whose observation is 10 * env + reward.
+  // Adds a step with the observation 10 * env + reward.
   static absl::Status Add(EpisodeReturns* returns, int env, float reward, float discount,
                           const TransitionValue& value, bool ends) {
     const float observation[1] = {static_cast<float>(10 * env) + reward}, action[1] = {0};

@@ -18,8 +18,8 @@ using ::testing::IsEmpty;
 using ::testing::Pair;
 using PolicyPtr = std::shared_ptr<const PolicyNetworks>;
 
-// The loop with a clock of its own: each wait moves the time to the deadline and then plays the script's next
-// entry.
+// Runs the loop with a clock of its own. Each wait moves the time to the deadline and then plays the next
+// entry of the script.
 class EvaluationLoopTest : public ::testing::Test {
  protected:
   EvaluationLoopTest()
@@ -41,7 +41,8 @@ class EvaluationLoopTest : public ::testing::Test {
                 }};
   }
 
-  // What the script's next entry leaves behind: a policy, an error, or nothing new before the deadline.
+  // Plays the script's next entry and returns its result: a policy, an error, or nothing new before the
+  // deadline.
   absl::StatusOr<PolicyPtr> NextPolicy(const PolicyPtr& last) {
     PlayNext();
     if (newest_.ok() && *newest_ == last) return absl::DeadlineExceededError("no new policy");
@@ -75,8 +76,8 @@ class EvaluationLoopTest : public ::testing::Test {
   int attempts_ = 0;
   std::vector<std::pair<std::uint64_t, std::string>> reports_;
   std::vector<EvaluationReport> whole_reports_;
-  std::map<std::uint64_t, double> scores_;  // of a version, summed over the opponents
-  std::vector<std::uint64_t> kept_;         // versions, as they were the best
+  std::map<std::uint64_t, double> scores_;  // by version, summed over the opponents
+  std::vector<std::uint64_t> kept_;         // the versions that were the best so far, in order
   std::vector<std::vector<std::uint64_t>> kept_at_report_;
   std::vector<absl::Duration> waits_;
   std::deque<std::function<void()>> script_;
@@ -107,7 +108,7 @@ TEST_F(EvaluationLoopTest, KeepsItsDeadlinesAndCatchesUpAfterALongRound) {
                time_of_a_report_ = absl::Seconds(11);
              }};
   ASSERT_TRUE(loop_.Run().ok());
-  // 6 of 10 s went into the first round, none into the second, 22 into the third.
+  // The first round took 6 of the 10 s, the second none, the third 22.
   EXPECT_THAT(waits_, ElementsAre(absl::Seconds(4), absl::Seconds(10), absl::ZeroDuration()));
 }
 
@@ -125,7 +126,7 @@ TEST_F(EvaluationLoopTest, KeepsEachPolicyThatIsBetterThanAllBeforeIt) {
   EXPECT_EQ(kept_, expected);
   EXPECT_GT(kept_.size(), 1u);
   EXPECT_LT(kept_.size(), 8u);
-  // Kept before the last report of its round, for who acts on that may stop everything.
+  // The policy is kept before the last report of its round, because a reader of that report may stop the run.
   EXPECT_THAT(kept_at_report_[0], IsEmpty());
   EXPECT_THAT(kept_at_report_[1], ElementsAre(1));
 }
@@ -153,7 +154,7 @@ TEST_F(EvaluationLoopTest, EndsWithTheErrorOfItsPolicies) {
   EXPECT_TRUE(absl::IsInvalidArgument(loop_.Run()));
 }
 
-// Version v has 10 v updates: iteration v / 2.
+// Version v has 10 v updates, so it belongs to iteration v / 2.
 class EvaluationByUpdatesTest : public EvaluationLoopTest {
  protected:
   explicit EvaluationByUpdatesTest(bool resumed = false)

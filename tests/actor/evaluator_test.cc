@@ -14,7 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// More episodes than one group has, and not a multiple.
+// More episodes than one group has, and not a multiple of that.
 constexpr int kEpisodes = 150;
 
 TEST(EvaluatorTest, ResultsDoNotDependOnTheNumberOfThreads) {

@@ -74,7 +74,7 @@ TEST(ExplorationTest, DrawsContinuousActionsFromTheWholeBox) {
   EXPECT_NEAR(actions.mean(), 0, 4 * std::sqrt(1.0 / 3 / (2 * kCount)));
 }
 
-// Takes `rounds` steps.
+// Makes `rounds` steps.
 void Step(Exploration* exploration, int rounds) {
   const auto n = static_cast<Eigen::Index>(exploration->shares().size());
   MatrixX<float> actions = MatrixX<float>::Zero(1, n);

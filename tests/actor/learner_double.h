@@ -1,4 +1,5 @@
-// The learner's side of the wire for the tests of this room: serves the policies that a test offers.
+// A double of the learner's policy service for the tests of this folder. It serves the policies that a test
+// offers.
 #pragma once
 
 #include <unistd.h>
@@ -64,7 +65,7 @@ class LearnerDouble : public Policy::Service {
     absl::MutexLock lock(&mutex_);
     return reports_;
   }
-  // Waits until n evaluations have been reported; false after `timeout`.
+  // Waits until n evaluations have been reported. Returns false after `timeout`.
   bool AwaitReports(int n, absl::Duration timeout) const {
     absl::MutexLock lock(&mutex_);
     const auto reached = [&] { return static_cast<int>(reports_.size()) >= n; };
@@ -74,7 +75,7 @@ class LearnerDouble : public Policy::Service {
     absl::MutexLock lock(&mutex_);
     return subscriptions_;
   }
-  // Waits until there have been n subscriptions; false after `timeout`.
+  // Waits until there have been n subscriptions. Returns false after `timeout`.
   bool AwaitSubscriptions(int n, absl::Duration timeout) const {
     absl::MutexLock lock(&mutex_);
     const auto reached = [&] { return subscriptions_ >= n; };
@@ -97,7 +98,7 @@ class LearnerDouble : public Policy::Service {
       {
         absl::MutexLock lock(&mutex_);
         const auto ready = [&] { return closed_ || offers_ > sent || context->IsCancelled(); };
-        // A client's cancellation wakes no condition: look for it now and then.
+        // A client's cancellation wakes no condition, so the loop looks for it regularly.
         if (!mutex_.AwaitWithTimeout(absl::Condition(&ready), absl::Milliseconds(20))) continue;
         if (closed_ || context->IsCancelled()) return grpc::Status::OK;
         sent = offers_;

@@ -1,4 +1,4 @@
-// A tiny environment for the tests of this room: it can be cut at a time limit, which Connect-4 never is.
+// A tiny environment for the tests of this folder. It can be cut at a time limit, which Connect-4 never is.
 #pragma once
 
 #include <cstdint>
@@ -11,9 +11,9 @@
 
 namespace dbr {
 
-// Walks along a line. The seed says how far: seed % 4 + 2 steps; an even seed ends at a true terminal, an odd
-// one is cut there, as broken where seed % 4 is 3. Observation: {seed % 1000, steps so far}. Action k of
-// three is illegal where steps % 3 == k. The reward is steps so far + action / 10.
+// Walks along a line for (random seed % 4) + 2 steps. An even random seed ends at a true terminal; an odd one
+// is cut there, as broken where seed % 4 is 3. Observation: {seed % 1000, steps so far}. Action k of three is
+// illegal where steps % 3 == k. The reward is steps so far + action / 10.
 class LineEnv : public Env {
  public:
   const EnvSpec& spec() const override { return spec_; }

@@ -18,9 +18,9 @@ namespace {
 using ::testing::HasSubstr;
 using PolicyPtr = PolicySubscriber::PolicyPtr;
 
-constexpr absl::Duration kLong = absl::Seconds(30);  // reached only where something is wrong
+constexpr absl::Duration kLong = absl::Seconds(30);  // reached only where a test fails
 
-// What the log says while this lives. Read it after the threads that log have ended.
+// Captures the log during its lifetime. Read it after the threads that log have ended.
 class CapturedLog {
  public:
   CapturedLog() : before_(spdlog::default_logger()) {

@@ -1,4 +1,4 @@
-// The program dbr-actor as a process: its exit codes, its error lines and its end on a signal.
+// Tests the program dbr-actor as a process: its exit codes, its error lines and its end on a signal.
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
@@ -25,9 +25,9 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-constexpr absl::Duration kLong = absl::Seconds(30);  // reached only where something is wrong
+constexpr absl::Duration kLong = absl::Seconds(30);  // reached only where a test fails
 
-// dbr-actor with its standard error read by us. It runs without OPENBLAS_NUM_THREADS, as users start it:
+// Runs dbr-actor and reads its standard error. It runs without OPENBLAS_NUM_THREADS, as users start it:
 // OpenBLAS then has threads of its own before main.
 class Program {
  public:
@@ -58,7 +58,7 @@ class Program {
     close(output_fd_);
   }
 
-  // Reads until `words` have come; false where the output ended or took too long.
+  // Reads until `words` have come. Returns false where the output ended or took too long.
   bool AwaitOutput(const std::string& words) {
     while (!absl::StrContains(output_, words)) {
       if (!ReadMore()) return false;
@@ -67,7 +67,7 @@ class Program {
   }
   void Signal(int number) { kill(pid_, number); }
 
-  // Reads to the end; gives the exit code, or minus the signal that killed it.
+  // Reads to the end. Returns the exit code, or minus the number of the signal that killed it.
   int Wait() {
     while (ReadMore()) continue;
     int status = 0;

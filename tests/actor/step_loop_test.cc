@@ -16,7 +16,7 @@ using Floats = std::vector<float>;
 constexpr int kEnvs = 6;
 constexpr int kSteps = 40;
 
-// A transition as the sink saw it.
+// A transition as the sink received it.
 struct Seen {
   Floats observation, action, mask, next_observation, next_mask;
   float reward, discount, monte_carlo_return, advantage;
@@ -40,7 +40,7 @@ TransitionSink Into(std::vector<Seen>* seen) {
   };
 }
 
-// kSteps steps in kEnvs lines by one policy; entry [step * kEnvs + i] belongs to environment i.
+// Makes kSteps steps in kEnvs lines by one policy. Entry [step * kEnvs + i] belongs to environment i.
 std::vector<Seen> Walk(const StepLoopOptions& options, std::uint64_t seed, bool with_critics = true) {
   std::vector<Seen> seen;
   StepLoop loop(MakeLines(kEnvs), options, Rng(seed), Into(&seen));
@@ -149,7 +149,7 @@ TEST(StepLoopTest, JudgesTheActionThatWasTakenByThePushedCritics) {
                         Eigen::Map<const VectorX<float>>(t.mask.data(), 3));
         const auto action = static_cast<int>(t.action[0]);
         EXPECT_GT(t.mask[action], 0);
-        // To a float's digits, whatever size the untrained critics give.
+        // The tolerance is a float's precision at the size of the untrained critics' values.
         EXPECT_NEAR(t.advantage, view.q(action, 0) - view.policy.col(0).dot(view.q.col(0)),
                     1e-5 * (1 + view.q.cwiseAbs().maxCoeff()));
         EXPECT_EQ(t.critic_version, version);
@@ -159,7 +159,7 @@ TEST(StepLoopTest, JudgesTheActionThatWasTakenByThePushedCritics) {
   }
 }
 
-// V(s) by the networks' own outputs.
+// Returns V(s) from the networks' outputs.
 float ValueOf(const PolicyNetworks& policy, const Floats& observation, const Floats& mask) {
   PolicyRunner runner;
   const PolicyView& view = runner.View(policy, Eigen::Map<const VectorX<float>>(observation.data(), 2),
@@ -188,7 +188,7 @@ TEST(StepLoopTest, WithReturnsEpisodesGoOutWholeAndBootstrapByTheCriticWhereThey
       EXPECT_EQ(seen[t].step(), static_cast<float>(t - first));
       value = seen[t].reward + kDiscount * value;
       const double state_value = ValueOf(*policy, seen[t].observation, seen[t].mask);
-      constexpr double kDigits = 1e-5;  // of a float
+      constexpr double kDigits = 1e-5;  // the precision of a float
       EXPECT_NEAR(seen[t].monte_carlo_return, value, kDigits * (1 + std::abs(value)));
       EXPECT_NEAR(seen[t].advantage, kScale * value - state_value,
                   kDigits * (1 + kScale * std::abs(value) + std::abs(state_value)));

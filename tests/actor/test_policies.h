@@ -1,4 +1,4 @@
-// Untrained policies for the tests of this room.
+// Untrained policies for the tests of this folder.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace dbr {
 
-// A snapshot with networks of two hidden layers of 16, whose parameters `version` decides.
+// Returns a snapshot with networks of two hidden layers of 16. `version` decides their parameters.
 inline PolicySnapshot UntrainedSnapshot(const EnvSpec& env, std::uint64_t version, bool with_critics = true) {
   PolicySnapshot snapshot;
   snapshot.version = version;
