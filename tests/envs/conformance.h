@@ -1,5 +1,4 @@
-// What every environment must keep, whatever its kind: checks that conformance_test.cc runs over the whole
-// registry.
+// The rules for every environment, of any kind: checks that conformance_test.cc runs over the whole registry.
 #pragma once
 
 #include <cmath>
@@ -16,7 +15,7 @@
 
 namespace dbr::conformance {
 
-// An environment with guarded memory for what it writes, and an agent that acts at random.
+// An environment with guarded memory for its outputs, and an agent that acts at random.
 class World {
  public:
   explicit World(const EnvOptions& options) : env_(MakeEnv(options).value()) {
@@ -74,7 +73,7 @@ class World {
     action_[0] = static_cast<float>(choice);
   }
 
-  // So that a float that is not written is not finite.
+  // Fills the memory with NaN, so that a float that is not written is not finite.
   void Poison() {
     for (float& value : observation()) value = std::numeric_limits<float>::quiet_NaN();
     for (float& value : mask()) value = std::numeric_limits<float>::quiet_NaN();
@@ -93,12 +92,12 @@ class World {
   std::vector<float> action_;
 };
 
-// How many episodes show what one may show: fewer where episodes are long.
+// The number of episodes that is enough to see everything. It is smaller where episodes are long.
 inline std::uint64_t EnoughEpisodes(const EnvSpec& spec) {
   return spec.max_episode_steps > 100 ? 3 : 20;
 }
 
-// All that an episode of random actions showed.
+// Everything that was seen in an episode of random actions.
 struct Episode {
   std::vector<std::vector<float>> seen;  // observation and mask, one more than there are steps
   std::vector<std::vector<float>> actions;
@@ -130,8 +129,8 @@ inline void ExpectSameEpisode(const Episode& a, const Episode& b) {
   }
 }
 
-// Everything written, finite, within its memory; masks of zeros and ones, with a legal action while the
-// episode runs.
+// Expects that all values are written, finite and within their memory. Masks have zeros and ones, with a
+// legal action while the episode runs.
 inline void ExpectWellWritten(World& world, bool done) {
   EXPECT_TRUE(world.GuardsIntact());
   for (const float value : world.observation()) EXPECT_TRUE(std::isfinite(value));
@@ -139,7 +138,8 @@ inline void ExpectWellWritten(World& world, bool done) {
   EXPECT_TRUE(done || !world.spec().actions.discrete() || world.CountLegal() > 0) << "no legal action";
 }
 
-// Rewards finite; a score only at the end, where the spec promises one, and of the three values.
+// Expects a finite reward. A score may come only at the end, only where the spec has scores, and is one of
+// the three values.
 inline void ExpectSaneResult(const EnvSpec& spec, const StepResult& result) {
   EXPECT_TRUE(std::isfinite(result.reward));
   EXPECT_FALSE(result.terminated && result.truncated);

@@ -1,4 +1,5 @@
-// The robots as environments: what an episode is, what ends it, and what happens to a world that breaks.
+// Tests the robots as environments: what an episode is, what ends it, and what happens to a world that
+// breaks.
 #include "envs/env.h"
 
 #include <cmath>
@@ -38,7 +39,8 @@ struct World {
   std::vector<float> observation;
 };
 
-// All observations and rewards of `steps` steps of random actions, episode after episode.
+// Returns all observations and rewards of `steps` steps of random actions, over as many episodes as that
+// takes.
 std::vector<float> Wander(const std::string& name, std::uint64_t seed, int steps) {
   World world(name);
   Rng rng(seed);

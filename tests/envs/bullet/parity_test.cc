@@ -1,4 +1,5 @@
-// The robots beside PyBullet: recorded episodes, replayed from the recorded start with the recorded actions.
+// Compares the robots with PyBullet: replays recorded episodes from the recorded start with the recorded
+// actions.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -21,17 +22,17 @@ namespace {
 
 using Json = nlohmann::json;
 
-// How far a replay has to agree. A machine like the recording's agrees in every bit. On others sine and
-// cosine round differently, and contacts amplify that: some ten steps can be compared.
+// How closely a replay must agree. On a machine like the recording's it agrees in every bit. On others, sine
+// and cosine round differently and contacts amplify that, so only about ten steps can be compared.
 struct Agreement {
   int steps = std::numeric_limits<int>::max();
-  double difference = 0;  // 0: none, not even in the sign of a zero
+  double difference = 0;  // 0: no difference, not even in the sign of a zero
 
   bool Holds(double found, double expected) const {
     if (difference == 0) return std::bit_cast<std::uint64_t>(found) == std::bit_cast<std::uint64_t>(expected);
     return std::abs(found - expected) <= difference;
   }
-  // Doubles this close may round to neighbouring floats.
+  // Doubles that differ this little may round to neighbouring floats.
   bool HoldsForFloats(float found, float expected) const {
     return Holds(found, expected) || (difference > 0 && std::nextafter(found, expected) == expected);
   }
@@ -87,7 +88,7 @@ void Replay(LocomotionTask& task, const Json& episode) {
 }
 
 struct Robot {
-  std::string id;  // of PyBullet
+  std::string id;  // PyBullet's name of the environment
   RobotPlan (*plan)();
 };
 

@@ -17,7 +17,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-// Left and right exchanged.
+// Exchanges left and right.
 Cells Mirror(Cells cells) {
   Cells mirrored = 0;
   for (int column = 0; column < kColumns; ++column) {
@@ -27,7 +27,7 @@ Cells Mirror(Cells cells) {
   return mirrored;
 }
 
-// The rule as it is told: a cell, a direction, four stones.
+// The rule in its plain form: from a cell, in a direction, four stones.
 bool HasFourByLines(Cells stones) {
   const auto has = [stones](int column, int row) {
     return column >= 0 && column < kColumns && row >= 0 && row < kRows && (stones & Cell(column, row)) != 0;

@@ -18,7 +18,7 @@ namespace {
 using ::testing::Each;
 using ::testing::HasSubstr;
 
-// An environment with the memory that it writes into.
+// An environment with memory for its outputs.
 struct World {
   explicit World(std::vector<std::string> opponents) : env(Connect4Env::Make(opponents).value()) {}
 
@@ -31,7 +31,7 @@ struct World {
     return static_cast<int>(std::find(mask.begin(), mask.end(), 1.0f) - mask.begin());
   }
 
-  // The stones of a plane: 0 the agent's, 1 the opponent's.
+  // Returns the stones of a plane: 0 for the agent's, 1 for the opponent's.
   Cells Stones(int plane) const {
     Cells stones = 0;
     for (int row = 0; row < kRows; ++row) {
@@ -94,11 +94,11 @@ TEST(Connect4Env, TheLastStepShowsTheFinalPositionAndItsOutcome) {
 
 TEST(Connect4Env, DrawsAnOpponentForEachEpisode) {
   World world({"random", "one_ply"});
-  std::array<int, 2> blocked = {};  // of three agent's stones in a column, by starting side
+  std::array<int, 2> blocked = {};  // threats that the opponent blocked, by starting side
   std::array<int, 2> threats = {};
   for (std::uint64_t seed = 0; seed < 3000; ++seed) {
     world.Reset(seed);
-    bool undisturbed = true;  // the column holds the agent's stones alone and the game goes on
+    bool undisturbed = true;  // the column has only the agent's stones and the game continues
     for (int stone = 0; stone < 3 && undisturbed; ++stone) {
       undisturbed = !world.Step(3).done();
       if (stone < 2)
@@ -110,7 +110,7 @@ TEST(Connect4Env, DrawsAnOpponentForEachEpisode) {
     ++threats[seed % 2];
     blocked[seed % 2] += (world.Stones(1) & Cell(3, 3)) != 0;
   }
-  for (const int side : {0, 1}) {  // one_ply blocks always, random with probability 1/7
+  for (const int side : {0, 1}) {  // one_ply always blocks, random with probability 1/7
     EXPECT_GT(threats[side], 500);
     EXPECT_NEAR(static_cast<double>(blocked[side]) / threats[side], 0.5 + 0.5 / 7, 0.08);
   }

@@ -1,4 +1,4 @@
-// The rules against the reference files.
+// Tests the rules with the reference files.
 #include <algorithm>
 #include <bit>
 #include <cstdint>
@@ -81,7 +81,7 @@ json Perft(const std::vector<Counted>& positions, int depth) {
 }
 
 TEST(Connect4Facts, PerftCountsAgree) {
-  constexpr int kDeepest = 9;  // a depth more costs six times the time
+  constexpr int kDeepest = 9;  // one depth more takes six times as long
   std::map<int, json> counted;
   std::vector<Counted> positions = {{Board(), 1}};
   for (int depth = 0; depth <= kDeepest; ++depth) {
@@ -100,7 +100,7 @@ TEST(Connect4Facts, PerftCountsAgree) {
   }
 }
 
-// What every position of the files says about itself and about its moves.
+// Expects that the facts of a position in the files agree with the board and its moves.
 void ExpectFactsAgree(const json& position) {
   SCOPED_TRACE(position.at("id").get<std::string>());
   const absl::StatusOr<Board> board = Board::FromMoves(position.at("moves").get<std::string>());
@@ -142,7 +142,7 @@ TEST(Connect4Facts, TacticsAgreeOnWinsAndThreats) {
   }
 }
 
-// The share of the tactics of a kind that a player answers.
+// Returns the share of the tactics of one kind that a player answers with the right move.
 double ShareAnswered(const std::string& player, const std::string& kind) {
   const auto opponent = MakeOpponent(player).value();
   Rng rng(21);

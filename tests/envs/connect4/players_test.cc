@@ -1,4 +1,4 @@
-// Random playouts, the opponents and their strength.
+// Tests random playouts, the opponents and their strength.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -30,7 +30,7 @@ TEST(NthSetBit, SkipsTheBitsBelow) {
   }
 }
 
-// A draw serves eight choices; each of the eight must be uniform, whatever the number of set bits.
+// One draw serves eight choices. Each of the eight must be uniform for any number of set bits.
 TEST(ChoiceStream, IsUniformInEachOfItsEightPlaces) {
   constexpr int kDraws = 70000;
   for (int n = 1; n <= kColumns; ++n) {
@@ -75,7 +75,7 @@ TEST(RandomPlayout, FromTheEmptyBoardHasTheKnownShares) {
   EXPECT_NEAR(static_cast<double>(draws) / kGames, 0.0026, 0.0005);
 }
 
-// The expectation of a random playout, for the side to move, by playing every game.
+// Returns the expectation of a random playout for the side to move, by playing every game.
 double ExactPlayoutMean(const Board& board) {
   double sum = 0;
   for (int column = 0; column < kColumns; ++column) {
@@ -138,7 +138,7 @@ TEST(TreeSearch, WithTheSameSeedPlaysTheSameMoves) {
   TreeSearch first(200);
   TreeSearch second(200);
   Rng other(7);
-  second.ChooseColumn(Board(), other);  // an earlier search must leave nothing behind
+  second.ChooseColumn(Board(), other);  // an earlier search must not change a later one
   Rng rng_a(47);
   Rng rng_b(47);
   for (Board board; !board.IsOver();) {
@@ -158,9 +158,9 @@ TEST(TreeSearch, ASingleSimulationPlaysAnyColumn) {
   for (const int count : counts) EXPECT_NEAR(count, 1000, 150);
 }
 
-// The strength of a player hardly shows its exploration, the spread of its visits does: the share of the
-// middle column is 0.40 with c = 1.4 and 0.25 with c = 2.8 (as with c = 1.4 and outcomes counted from 0 to
-// 1).
+// A player's strength hardly depends on its exploration constant, but the spread of its visits does. The
+// share of the middle column is 0.40 with c = 1.4 and 0.25 with c = 2.8 (as with c = 1.4 and outcomes counted
+// from 0 to 1).
 TEST(TreeSearch, SpreadsItsVisitsAsTheExplorationConstantSays) {
   constexpr int kSearches = 300;
   constexpr int kSimulations = 1000;
@@ -171,7 +171,7 @@ TEST(TreeSearch, SpreadsItsVisitsAsTheExplorationConstantSays) {
     search.ChooseColumn(Board(), rng);
     int visits = 0;
     for (int column = 0; column < kColumns; ++column) visits += search.Visits(column);
-    ASSERT_EQ(visits, kSimulations - 1);  // the first simulation is the root's own
+    ASSERT_EQ(visits, kSimulations - 1);  // the first simulation is the root's own playout
     middle += search.Visits(3);
   }
   EXPECT_NEAR(static_cast<double>(middle) / kSearches / kSimulations, 0.303, 0.025);
@@ -194,7 +194,7 @@ TEST(MakeOpponent, NamesTheKnownOnesForAnUnknownName) {
   }
 }
 
-// Mean score of a player against random over 2,000 games, colours alternating.
+// Returns the mean score of a player against random over 2,000 games. The starting side alternates.
 double ScoreAgainstRandom(const std::string& name, std::uint64_t seed) {
   constexpr int kGames = 2000;
   const auto player = MakeOpponent(name).value();

@@ -13,7 +13,7 @@
 
 namespace dbr::connect4 {
 
-// Every KIND*.json of the folder connect4 of the reference data, parsed. Fails the test where there is none.
+// Reads every KIND*.json in the folder connect4 of the reference data. Fails the test where there is none.
 inline std::vector<nlohmann::json> ReadReferenceFiles(const std::string& kind) {
   std::vector<std::filesystem::path> paths;
   for (const auto& entry : std::filesystem::directory_iterator(ReferenceDir() / "connect4")) {
@@ -31,7 +31,7 @@ inline std::vector<nlohmann::json> ReadReferenceFiles(const std::string& kind) {
   return files;
 }
 
-// The positions of every KIND*.json.
+// Returns the positions of every KIND*.json.
 inline std::vector<nlohmann::json> ReadReferencePositions(const std::string& kind) {
   std::vector<nlohmann::json> positions;
   for (const nlohmann::json& file : ReadReferenceFiles(kind)) {
