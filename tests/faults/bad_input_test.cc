@@ -1,4 +1,5 @@
-// What wrong flags, configs, folders and files get: a clear line, an exit status, and nothing lost.
+// Tests wrong flags, configs, folders and files: each gets a clear line and an exit status, and nothing is
+// lost.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -117,7 +118,7 @@ TEST_F(BadInputTest, DamagedCheckpointsAndPoliciesAreRefusedByName) {
   for (const auto& entry : std::filesystem::directory_iterator(run_.checkpoints()))
     checkpoints.push_back(entry.path());
   std::sort(checkpoints.begin(), checkpoints.end());
-  // An older whole one, and a newest one that is cut short.
+  // There is an older complete checkpoint and a newest one that is truncated.
   const std::string newest = absl::StrCat(run_.checkpoints(), "/999999999999.safetensors");
   std::filesystem::copy_file(checkpoints.back(), newest);
   std::filesystem::resize_file(newest, std::filesystem::file_size(newest) / 2);

@@ -1,4 +1,4 @@
-// Killing processes of a run, one after the other.
+// Kills the processes of a run, one after the other.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -23,7 +23,7 @@ using Json = nlohmann::json;
 
 class KillTest : public testing::Test {
  protected:
-  // Kills a process of the run with SIGKILL, and waits until the launcher has said so.
+  // Kills a process of the run with SIGKILL and waits until the launcher has logged it.
   void Kill(DbrProcess* launch, const std::string& name) {
     const pid_t pid = NewestProcess(name);
     ASSERT_GT(pid, 0) << name;
@@ -32,7 +32,7 @@ class KillTest : public testing::Test {
     ASSERT_TRUE(AllEndWithin({pid}, kPatience));
   }
 
-  // By the launcher's log: "NAME started (process PID)".
+  // Reads it from the launcher's log: "NAME started (process PID)".
   pid_t NewestProcess(const std::string& name) const {
     pid_t newest = 0;
     for (const absl::string_view line : absl::StrSplit(Contents(run_.log("launch")), '\n')) {
@@ -47,7 +47,7 @@ class KillTest : public testing::Test {
   const RunFolder run_{folder_ / "run"};
 };
 
-// No writer's sequence has a hole, and all that the server counts came from one of them.
+// Expects that no writer's sequence has a gap, and that every transition of the server came from a writer.
 void ExpectNothingLost(const Json& stats) {
   std::uint64_t sum = 0;
   for (const Json& writer : stats["writers"]) {
@@ -67,7 +67,7 @@ TEST_F(KillTest, ARunSurvivesTheDeathOfEachProcess) {
   ASSERT_THAT(before["writers"], SizeIs(1));
   ExpectNothingLost(before);
   Kill(&launch, "actor-0");
-  // Its successor is a writer of its own; what the dead one had inserted stays.
+  // The new process is another writer. The transitions that the dead one had inserted stay.
   ASSERT_TRUE(launch.Await([&] {
     const Json now = Stats(run_);
     return now.is_object() && now["writers"].size() == 2 && now["writers"][1]["inserted"] > 0;

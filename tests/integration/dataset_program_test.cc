@@ -1,4 +1,4 @@
-// `dbr dataset` as people call it.
+// Tests `dbr dataset` on the command line, as users call it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>

@@ -39,7 +39,7 @@ DbrProcess::DbrProcess(const std::string& program, std::vector<std::string> argu
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
-  // Without OPENBLAS_NUM_THREADS, as users start it.
+  // The program runs without OPENBLAS_NUM_THREADS, as users start it.
   std::vector<char*> environment;
   for (char** entry = environ; *entry != nullptr; ++entry) {
     if (!absl::StartsWith(*entry, "OPENBLAS_NUM_THREADS=")) environment.push_back(*entry);
@@ -124,7 +124,7 @@ bool AllEndWithin(const std::vector<pid_t>& processes, absl::Duration timeout) {
   const absl::Time deadline = absl::Now() + timeout;
   for (const pid_t pid : processes) {
     const int fd = static_cast<int>(syscall(SYS_pidfd_open, pid, 0));
-    if (fd < 0) continue;  // it has ended
+    if (fd < 0) continue;  // the process has ended
     pollfd waiting = {fd, POLLIN, 0};
     const bool ended = poll(&waiting, 1, Milliseconds(deadline - absl::Now())) == 1;
     close(fd);

@@ -1,4 +1,4 @@
-// Our programs as processes of a test.
+// Runs our programs as processes of a test.
 #pragma once
 
 #include <sys/types.h>
@@ -11,10 +11,11 @@
 
 namespace dbr {
 
-// Reached only where something is wrong.
+// The longest wait. It is reached only where a test fails.
 inline constexpr absl::Duration kPatience = absl::Minutes(5);
 
-// A program of build/bin whose stdout and stderr the test reads. Killed when the object goes. One thread.
+// A program of build/bin. The test reads its stdout and stderr. The destructor kills it. One thread at a
+// time.
 class DbrProcess {
  public:
   DbrProcess(const std::string& program, std::vector<std::string> arguments);
@@ -22,17 +23,17 @@ class DbrProcess {
   DbrProcess(const DbrProcess&) = delete;
   DbrProcess& operator=(const DbrProcess&) = delete;
 
-  // Reads until `words` have come; false where the output ended or patience did.
+  // Reads until `words` have come. Returns false where the output ended or kPatience has passed.
   bool AwaitOutput(const std::string& words);
 
-  // Asks `condition` again at each piece of output, and at least five times a second, until it holds; false
-  // where the process ended or patience did.
+  // Calls `condition` again at each piece of output, and at least five times a second, until it holds.
+  // Returns false where the process ended or kPatience has passed.
   bool Await(const std::function<bool()>& condition);
 
   void Signal(int number) const;
 
-  // Reads to the end of the output, which comes when the program and all who share its output have ended;
-  // gives the exit status, or minus the signal that ended it.
+  // Reads to the end of the output, which comes when the program and all processes that share its output have
+  // ended. Returns the exit status, or minus the number of the signal that ended it.
   int Wait();
 
   pid_t pid() const { return pid_; }
@@ -47,13 +48,13 @@ class DbrProcess {
   std::string output_;
 };
 
-// Runs to the end: {exit status, output}.
+// Runs a program to its end. Returns {exit status, output}.
 std::pair<int, std::string> RunProgram(const std::string& program, std::vector<std::string> arguments);
 
-// Processes whose command line holds both texts.
+// Returns the processes whose command line holds both texts. Reads /proc.
 std::vector<pid_t> ProcessesOf(const std::string& program, const std::string& words);
 
-// Waits until each of them has ended; false after `timeout`.
+// Waits until each of them has ended. Returns false after `timeout`.
 bool AllEndWithin(const std::vector<pid_t>& processes, absl::Duration timeout);
 
 }  // namespace dbr

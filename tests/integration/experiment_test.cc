@@ -1,4 +1,4 @@
-// Grids of runs with the real programs.
+// Tests grids of runs with the real programs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>

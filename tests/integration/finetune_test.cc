@@ -1,4 +1,4 @@
-// Offline training from a seed buffer and fine-tuning online, with the real programs.
+// Tests offline training on a seed buffer and online fine-tuning, with the real programs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -22,11 +22,11 @@ using ::testing::Not;
 using Json = nlohmann::json;
 
 constexpr int kSeedBufferRows = 3000;
-constexpr int kOfflineUpdates = 200;  // of finetune.textproto
+constexpr int kOfflineUpdates = 200;  // as in finetune.textproto
 
 class FinetuneTest : public testing::Test {
  protected:
-  // A seed buffer of hopper with random actions.
+  // Records a seed buffer of the hopper with random actions.
   void SetUp() override {
     const auto [status, output] =
         RunProgram("dbr", {"dataset", "record", "--env", "hopper", "--quality", "random", "--steps",
@@ -43,7 +43,7 @@ class FinetuneTest : public testing::Test {
     return arguments;
   }
 
-  // Numbers of the seed buffer, as the replay server tells them in JSON.
+  // Checks the numbers of the seed buffer that the replay server gives in JSON.
   static void ExpectWholeSeedBuffer(const Json& stats) {
     ASSERT_TRUE(stats.is_object());
     EXPECT_EQ(stats["seed_buffer_rows"], kSeedBufferRows);
@@ -62,7 +62,7 @@ TEST_F(FinetuneTest, GoesOnlineAfterTheOfflinePhaseAndKeepsItsSeedOverAResume) {
   ASSERT_TRUE(launch.AwaitOutput("offline phase over")) << launch.output();
   EXPECT_THAT(launch.output(), AllOf(HasSubstr(absl::StrCat("seed buffer: ", seed_buffer_)),
                                      HasSubstr("the seed buffer holds 3,000 transitions")));
-  // More comes in than the buffer has room for, and the seed buffer stays.
+  // More transitions come in than the buffer has room for, and the seed buffer stays.
   Json stats;
   ASSERT_TRUE(launch.Await([&] {
     stats = Stats(run_);

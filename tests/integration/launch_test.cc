@@ -1,4 +1,4 @@
-// Whole runs: the real programs as processes, over real sockets.
+// Tests whole runs: the real programs as processes, over real sockets.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>

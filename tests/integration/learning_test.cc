@@ -1,4 +1,4 @@
-// Long learning runs with the real programs (label `slow`).
+// Tests long learning runs with the real programs (label `slow`).
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -18,7 +18,7 @@ TEST(Learning, SacOnTheHopperReaches800Within60000Steps) {
   DbrProcess launch("dbr", {"launch", DBR_SOURCE_DIR "/deploy/configs/hopper_medium.textproto", "--run-dir",
                             run.root, "--set", "launch.stop_at_return=800", "--set", "launch.max_steps=60000",
                             "--set", "evaluation.final_episodes=10"});
-  // An hour, should the machine be slow and busy.
+  // The test waits for up to an hour, for slow and busy machines.
   for (int patience = 0; patience < 12; ++patience) {
     if (launch.AwaitOutput("training ended")) break;
   }

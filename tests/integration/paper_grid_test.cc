@@ -1,4 +1,4 @@
-// The paper's whole grid at its smallest scale, and the report of it, with the real programs.
+// Tests the paper's whole grid at its smallest scale, and its report, with the real programs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -21,8 +21,8 @@ constexpr int kCells = 156;
 
 class PaperGridTest : public testing::Test {
  protected:
-  // Short stretches of random actions stand for the data of every quality: what is learned does not count
-  // here.
+  // Short recordings of random actions replace the data of every quality: this test does not check what is
+  // learned.
   void RecordSeedBuffers() const {
     std::filesystem::create_directory(data_);
     for (const std::string& robot : {"hopper", "walker2d", "half_cheetah", "ant"}) {

@@ -1,4 +1,4 @@
-// What tests read of a run: its files and its replay server.
+// Reads a run's files and its replay server, for tests.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -25,13 +25,13 @@ inline nlohmann::json Summary(const RunFolder& run) {
   return nlohmann::json::parse(Contents(run.summary()), nullptr, /*allow_exceptions=*/false);
 }
 
-// What `dbr stats --json` says; null where it got no answer.
+// Returns the output of `dbr stats --json`, or null where the server does not answer.
 inline nlohmann::json Stats(const RunFolder& run) {
   const auto [status, output] = RunProgram("dbr", {"stats", "--replay", run.root, "--json"});
   return status == 0 ? nlohmann::json::parse(output, nullptr, /*allow_exceptions=*/false) : nlohmann::json();
 }
 
-// A counter of Stats; 0 where it got no answer.
+// Returns a counter of Stats, or 0 where the server does not answer.
 inline std::uint64_t Counter(const RunFolder& run, const char* name) {
   const nlohmann::json stats = Stats(run);
   return stats.is_object() ? stats.value(name, std::uint64_t{0}) : 0;
