@@ -1,5 +1,5 @@
-// DBR's ablations: what self-imitation, the Munchausen term and the missing constraint change, and nothing
-// else.
+// Tests DBR's ablations: self-imitation, the Munchausen term and the missing constraint each change what they
+// should, and nothing else.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -57,7 +57,7 @@ TEST(MunchausenTest, TheLogIsClippedOnBothSides) {
   EXPECT_THAT(bonus, testing::ElementsAre(0, 0, testing::DoubleEq(-0.45), testing::DoubleEq(-0.9)));
 }
 
-// The gradient of the weighted likelihood through the network: read from the parameters' own gradient.
+// Checks the gradient of the weighted likelihood through the network, read from the network's own gradient.
 TEST(GaussianLikelihoodTest, TheWeightedFitHasItsGradient) {
   Rng rng(3);
   const MlpShape shape(3, {5}, 4);
@@ -107,7 +107,7 @@ class Ablations : public testing::Test {
     ADD_FAILURE() << name;
     return 0;
   }
-  // The networks after one update on the same batches.
+  // Returns the networks after one update on the same batches.
   std::vector<float> AfterOne(const BasicBatch<double>& uniform, const BasicBatch<double>& other,
                               const char* network, double* target = nullptr) {
     Dbr dbr(spec_);
@@ -134,7 +134,7 @@ TYPED_TEST(Ablations, SelfImitationsAdvantageIsTheScaledReturnLessTheStatesValue
   ASSERT_TRUE(moved.Update(uniform, other, other).ok());
   ASSERT_EQ(dbr.advantages().size(), 16u);
   for (int i = 0; i < 16; ++i) EXPECT_NEAR(moved.advantages()[i] - dbr.advantages()[i], 3 * 0.5, 1e-5);
-  // V is the same for both: the mean of 3 R - A is that of the values that the metrics show.
+  // V is the same for both, so the mean of 3 R - A is the mean of the values in the metrics.
   double value = 0;
   for (int i = 0; i < 16; ++i) value += 3 * uniform.returns[i] - moved.advantages()[i];
   EXPECT_LE(value / 16, this->Metric(moved, "train/value_mean") + 1e-5)
@@ -175,8 +175,8 @@ TYPED_TEST(Ablations, SelfImitationLearnsTheActionThatPaid) {
   for (int i = 0; i < 32; ++i) EXPECT_EQ(dbr.advantages()[i] > 0, i % 2 == 0);
 }
 
-// The clipped log lies in [-1, 0]: so does what the mean target moves by, and a weight twice as large moves
-// it twice as far.
+// The clipped log is in [-1, 0]. So the mean target moves by a value in [-weight, 0], and twice the weight
+// moves it twice as far.
 TYPED_TEST(Ablations, TheMunchausenTermLowersTheTargetsByTheWeightedLog) {
   this->spec_.config.set_reward_scale(2);
   const BasicBatch<double> uniform = this->Random(), other = this->Random();

@@ -1,4 +1,4 @@
-// What every algorithm of the registry must do, and that DBR solves small problems with known answers.
+// Tests what every algorithm of the registry must do, and that DBR solves small problems with known answers.
 #include "learner/algorithm.h"
 
 #include <gmock/gmock.h>
@@ -37,10 +37,10 @@ AlgorithmSpec SpecOf(const AlgorithmId& id, std::uint64_t seed = 1) {
   return spec;
 }
 
-// An algorithm with its defaults, or one of its variants.
+// An algorithm with its defaults, or with one of its variants.
 struct Member {
   AlgorithmId id;
-  std::string variant;  // of kVariants; empty: none
+  std::string variant;  // a name in kVariants; empty: the defaults
 };
 
 struct Variant {
@@ -156,7 +156,7 @@ TEST_P(Conformance, AcceptsABatchOfOneAndEmptyPartitions) {
   EXPECT_EQ(algorithm_->advantages().size(), 4u);
 }
 
-// Makes an action that is illegal everywhere be worth 10^6 in every network: nothing else changes, to the
+// Gives an action that is illegal everywhere the value 10^6 in every network. Nothing else changes, to the
 // last bit, and no mode plays it.
 TEST_P(Conformance, AnIllegalActionIsNeitherLearnedFromNorChosen) {
   if (GetParam().id.actions != ActionKind::kDiscrete) GTEST_SKIP() << "every action is legal";
@@ -244,7 +244,7 @@ TEST(LearningRateTest, FallsLinearlyToItsEndAndStaysThere) {
   EXPECT_EQ(LearningRate(config, 1000), 0.02);
 }
 
-// A rate that has fallen to 0 moves nothing more.
+// A learning rate that has fallen to 0 changes no parameter any more.
 TEST(LearningRateTest, ThatHasFallenTo0MovesNoPolicy) {
   for (const AlgorithmId& id : Algorithms()) {
     std::vector<float> policies[2];
@@ -298,7 +298,7 @@ TEST(Registry, OverDiscreteActionsAllThreeMmdsAreOne) {
   EXPECT_EQ(states[0].tensors, states[2].tensors);
 }
 
-// Observations far from 0 and of another scale give, but for rounding, what the same at home gives.
+// Observations far from 0 and at another scale give the same results, except for rounding.
 TEST(Normalized, TheScaleOfObservationsDoesNotMatter) {
   std::vector<float> policies[2];
   for (const int variant : {0, 1}) {
@@ -322,7 +322,7 @@ TEST(Normalized, TheScaleOfObservationsDoesNotMatter) {
     const std::vector<float>& statistics = *snapshot.Find(kObservationNormalizer);
     ASSERT_EQ(statistics.size(), 10u);
     EXPECT_NEAR(statistics[0], variant == 1 ? 3 : 0,
-                variant == 1 ? 1.6 : 0.2);  // the mean of 80 uniform draws
+                variant == 1 ? 1.6 : 0.2);  // within the error of the mean of 80 uniform draws
     EXPECT_NEAR(statistics[5], std::sqrt(3.0) / (variant == 1 ? 8 : 1), 0.3);
   }
   for (std::size_t i = 0; i < policies[0].size(); ++i) EXPECT_NEAR(policies[0][i], policies[1][i], 1e-4);
@@ -339,7 +339,7 @@ TEST(Normalized, ActingTakesTheStatisticsAlong) {
   PolicySnapshot with;
   (*algorithm)->ExportPolicy(&with);
   PolicySnapshot without = with;
-  without.networks.pop_back();  // the statistics
+  without.networks.pop_back();  // removes the statistics
   const auto act = [&](const PolicySnapshot& snapshot, const MatrixX<float>& observations) {
     PolicyRunner runner;
     MatrixX<float> actions(2, observations.cols());
@@ -356,7 +356,7 @@ TEST(Normalized, ActingTakesTheStatisticsAlong) {
 }
 
 TEST(DiscreteDbr, WarmStartLeavesQOut) {
-  // Policies that differ in their critics' data alone stay equal while Q is left out.
+  // Policies whose critics see different data stay equal while Q is left out.
   std::vector<float> policies[2];
   for (const int variant : {0, 1}) {
     AlgorithmSpec spec = SmallSpec();

@@ -27,7 +27,7 @@ bool dbr::CountsAllocations() {
   return true;
 }
 
-// glibc's own allocator under its internal names; ours take the public ones.
+// The internal names of glibc's allocator. The functions below take its public names.
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);

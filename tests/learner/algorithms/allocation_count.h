@@ -1,14 +1,15 @@
-// Counting what the whole program allocates.
+// Counts the allocations of the whole program.
 #pragma once
 
 #include <cstdint>
 
 namespace dbr {
 
-// Whether this build counts: not under a sanitizer, which has an allocator of its own.
+// Whether this build counts. A build with a sanitizer does not, because the sanitizer has an allocator of its
+// own.
 bool CountsAllocations();
 
-// Calls of malloc, calloc, realloc and the aligned ones so far, of all threads.
+// The number of calls of malloc, calloc, realloc and their aligned versions so far, in all threads.
 std::uint64_t AllocationCount();
 
 }  // namespace dbr

@@ -1,4 +1,4 @@
-// BRAC, TD3 and AWAC: what an update touches, and that each solves a bandit whose optimum is known.
+// Tests BRAC, TD3 and AWAC: what an update changes, and that each solves a bandit with a known optimum.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -40,7 +40,7 @@ double Metric(const Algorithm& algorithm, const std::string& name) {
   return 0;
 }
 
-// `updates` updates on random batches that depend on nothing but their number.
+// Makes `updates` updates on random batches that depend only on their number.
 std::unique_ptr<Algorithm> Trained(const AlgorithmSpec& spec, int updates) {
   auto algorithm = Make(spec);
   Rng rng(3);
@@ -77,7 +77,7 @@ TEST(Brac, TheValuePenaltyLowersTheTargetInProportionToTheMultiplier) {
 }
 
 TEST(Brac, WarmStartLeavesQOut) {
-  // Policies that differ in their critics' rewards alone stay equal while Q is left out.
+  // Policies whose critics see different rewards stay equal while Q is left out.
   std::vector<float> policies[2];
   for (const int variant : {0, 1}) {
     AlgorithmSpec spec = BaselineSpec(AlgorithmConfig::kBrac);
@@ -92,7 +92,7 @@ TEST(Brac, TheMultiplierMovesOnlyWhereItIsAdaptive) {
   for (const bool adaptive : {false, true}) {
     AlgorithmSpec spec = BaselineSpec(AlgorithmConfig::kBrac);
     spec.config.mutable_brac()->set_adaptive_multiplier(adaptive);
-    spec.config.mutable_brac()->set_epsilon(1000);  // far above any divergence: it must fall
+    spec.config.mutable_brac()->set_epsilon(1000);  // far above any divergence, so the multiplier must fall
     const double multiplier = Metric(*Trained(spec, 5), "train/multiplier");
     if (adaptive) {
       EXPECT_LT(multiplier, 0.999);
@@ -154,7 +154,7 @@ TEST(Awac, NoWeightPassesItsLimit) {
   EXPECT_LT(Metric(*algorithm, "train/weight_mean"), 5);
 }
 
-// One state, one step, one dimension; the actions are given, the reward is a function of them.
+// A bandit: one state, one step, one dimension. The actions are given, and the reward is a function of them.
 class Bandit : public testing::Test {
  protected:
   static constexpr int kActions = 32, kUpdates = 1200;
@@ -169,7 +169,7 @@ class Bandit : public testing::Test {
     return spec;
   }
 
-  // Trains on all actions at once; leaves the policy's Gaussian before the tanh in mean_, deviation_.
+  // Trains on all actions at once. Stores the policy's Gaussian before the tanh in mean_ and deviation_.
   template <class Reward>
   void Train(const AlgorithmSpec& spec, const VectorX<float>& actions, const Reward& reward) {
     Batch batch;
@@ -192,7 +192,7 @@ class Bandit : public testing::Test {
   }
 
   static VectorX<float> UniformActions() { return VectorX<float>::LinSpaced(kActions, -0.98f, 0.98f); }
-  // tanh of the quantiles of a normal of mean 0: its draws, without their chance.
+  // Returns tanh of the quantiles of a normal with mean 0: the same distribution as draws, without chance.
   static VectorX<float> NormalActions(double deviation) {
     VectorX<float> actions(kActions);
     for (int i = 0; i < kActions; ++i) {
@@ -212,21 +212,22 @@ class Bandit : public testing::Test {
 };
 
 TEST_F(Bandit, Td3FindsTheBestAction) {
-  // A tent: of a parabola's top a critic's smallest error would move the greatest value far.
+  // The reward is a tent. At the flat top of a parabola, a small error of the critic would move the greatest
+  // value far.
   const auto reward = [](float a) { return -std::abs(a - 0.4f); };
   Train(Spec(AlgorithmConfig::kTd3), UniformActions(), reward);
   EXPECT_NEAR(std::tanh(mean_), 0.4, 0.05);
 }
 
 TEST_F(Bandit, AwacFitsTheDataWeightedByItsAdvantages) {
-  // Of uniform actions and the reward -(a - 0.4)^2 the weighted data is a normal of variance lambda / 2.
+  // With uniform actions and the reward -(a - 0.4)^2 the weighted data is a normal with variance lambda / 2.
   AlgorithmSpec spec = Spec(AlgorithmConfig::kAwac);
   spec.config.mutable_awac()->set_temperature(0.02);
   spec.config.mutable_awac()->set_value_samples(4);
   const auto reward = [](float a) { return -(a - 0.4f) * (a - 0.4f); };
   Train(spec, UniformActions(), reward);
   EXPECT_NEAR(std::tanh(mean_), 0.4, 0.05);
-  EXPECT_NEAR(deviation_, 0.1 / (1 - 0.4 * 0.4), 0.04);  // 0.1, through the slope of atanh
+  EXPECT_NEAR(deviation_, 0.1 / (1 - 0.4 * 0.4), 0.04);  // 0.1 times the slope of atanh
 }
 
 TEST_F(Bandit, AwacsLikelihoodOfASingleActionStaysBounded) {
@@ -235,14 +236,14 @@ TEST_F(Bandit, AwacsLikelihoodOfASingleActionStaysBounded) {
   const auto reward = [](float) { return 0.5f; };
   Train(spec, VectorX<float>::Constant(kActions, 0.3f), reward);
   EXPECT_NEAR(std::tanh(mean_), 0.3, 0.01);
-  // At the lower limit of the log-std, at the mean itself: the density's greatest logarithm.
+  // The greatest logarithm of the density: at the mean, with the log-std at its lower limit.
   const double greatest = 5 - 0.9189 - std::log(1 - 0.3 * 0.3);
   EXPECT_GE(Metric(*algorithm_, "train/actor_loss"), -greatest - 1e-3);
 }
 
 TEST_F(Bandit, BracTradesRewardForDivergence) {
-  // Before the tanh the behaviour is N(0, 0.5^2) and the reward is u, so the optimum, in proportion to
-  // beta exp(u / alpha), is N(0.5^2 / alpha, 0.5^2).
+  // Before the tanh the behaviour is N(0, 0.5^2) and the reward is u. So the optimum, proportional to beta
+  // exp(u / alpha), is N(0.5^2 / alpha, 0.5^2).
   AlgorithmSpec spec = Spec(AlgorithmConfig::kBrac);
   spec.config.mutable_brac()->set_first_multiplier(0.5);
   const auto reward = [](float a) { return std::atanh(a); };
@@ -253,7 +254,7 @@ TEST_F(Bandit, BracTradesRewardForDivergence) {
 }
 
 TEST_F(Bandit, BracsAdaptiveMultiplierHoldsTheDivergenceAtEpsilon) {
-  // A divergence of 0.5 is a shift of the mean by one deviation.
+  // A divergence of 0.5 nats is a shift of the mean by one standard deviation.
   AlgorithmSpec spec = Spec(AlgorithmConfig::kBrac);
   spec.config.mutable_brac()->set_adaptive_multiplier(true);
   spec.config.mutable_brac()->set_epsilon(0.5);

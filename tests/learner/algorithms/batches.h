@@ -19,7 +19,7 @@ inline AlgorithmSpec SmallSpec(std::uint64_t seed = 1, ActionKind actions = Acti
   return spec;
 }
 
-// Random transitions, with returns where the algorithm takes them; of a discrete space action 2 is illegal in
+// Random transitions, with returns where the algorithm needs them. In a discrete space action 2 is illegal in
 // every third state.
 template <class Scalar>
 BasicBatch<Scalar> RandomBatch(const AlgorithmSpec& spec, int n, Rng& rng) {
@@ -42,7 +42,7 @@ BasicBatch<Scalar> RandomBatch(const AlgorithmSpec& spec, int n, Rng& rng) {
     if (restricted) batch.masks(2, j) = batch.next_masks(2, j) = 0;
     batch.actions(0, j) = static_cast<Scalar>(rng.Below(restricted ? 2 : 3));
   }
-  // Last, so that the rest is the same with and without them.
+  // The returns are drawn last, so that the rest is the same with and without them.
   for (Scalar& value : batch.returns) value = static_cast<Scalar>(3 * rng.Uniform() - 1);
   return batch;
 }

@@ -1,4 +1,5 @@
-// BEAR stays where its data is, though Q points away from it; what it refuses, and what its settings do.
+// Tests that BEAR stays near its data although Q points away from it, what it refuses, and what its settings
+// do.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -27,14 +28,14 @@ AlgorithmSpec OneState(const ActionSpace& actions) {
   return spec;
 }
 
-// BEAR with a multiplier that stays as good as 0.
+// Gives BEAR a multiplier that stays near 0.
 AlgorithmSpec Unconstrained(AlgorithmSpec spec) {
   spec.config.mutable_bear()->set_first_multiplier(0.007);
   spec.config.mutable_bear()->set_multiplier_learning_rate(0);
   return spec;
 }
 
-// 64 steps of one state that each end their episode; the caller fills in actions and rewards.
+// 64 steps from one state that each end their episode. The caller fills in actions and rewards.
 Batch EndingSteps(const AlgorithmSpec& spec) {
   Batch batch;
   batch.Resize({1, spec.actions.width(), spec.actions.mask_width()}, 64, /*with_keys=*/false);
@@ -52,7 +53,8 @@ std::shared_ptr<const PolicyNetworks> PolicyOf(const Algorithm& algorithm) {
   return PolicyNetworks::Create(std::move(snapshot)).value();
 }
 
-// The mean action learned from actions around 0.5, whose reward is the action itself: Q is greatest at 1.
+// Returns the mean action learned from actions around 0.5. The reward is the action itself, so Q is greatest
+// at 1.
 float ContinuousAction(const AlgorithmSpec& spec) {
   const auto algorithm = MakeAlgorithm(spec).value();
   Rng rng(4);
@@ -77,7 +79,8 @@ TEST(ContinuousBearTest, StaysOnTheDataWhereQPointsAway) {
   EXPECT_GT(ContinuousAction(Unconstrained(spec)), 0.9f);
 }
 
-// The policy learned from actions 0 and 1, which cost 1; action 2 is never seen, and its Q stays near 0.
+// Returns the policy learned from actions 0 and 1, which cost 1. Action 2 is never seen, and its Q stays near
+// 0.
 VectorX<float> DiscreteProbabilities(const AlgorithmSpec& spec) {
   const auto algorithm = MakeAlgorithm(spec).value();
   Batch batch = EndingSteps(spec);
@@ -106,7 +109,7 @@ TEST(BearTest, WarmStartLeavesQOut) {
   for (const ActionKind kind : {ActionKind::kDiscrete, ActionKind::kContinuous}) {
     std::vector<float> policies[2];
     for (const bool warm : {true, false}) {
-      // Two runs whose rewards differ alone: the policies stay equal while Q is left out.
+      // Two runs differ only in their rewards. The policies stay equal while Q is left out.
       for (const int variant : {0, 1}) {
         AlgorithmSpec spec = SmallSpec(1, kind);
         spec.config.mutable_bear()->set_warm_start_updates(warm ? 3 : 0);

@@ -1,5 +1,5 @@
-// No field of an algorithm's config is without effect: each, set to another value, changes what a few updates
-// make of the networks.
+// Tests that every field of an algorithm's config has an effect: with another value, a few updates give other
+// networks.
 #include <gmock/gmock.h>
 #include <google/protobuf/text_format.h>
 #include <gtest/gtest.h>
@@ -22,13 +22,13 @@ namespace {
 
 constexpr int kUpdates = 8;
 
-// A value of a field that is not its default, and the other fields that let it matter. A field may have
+// A value of a field that is not its default, and the other fields that make it matter. A field may have
 // several.
 struct Effect {
   const char* algorithm;  // the member of AlgorithmConfig's oneof
   const char* field;
   const char* value;       // "a: 1"
-  const char* where = "";  // in text format
+  const char* where = "";  // other fields, in text format
 };
 
 constexpr Effect kEffects[] = {
@@ -52,7 +52,7 @@ constexpr Effect kEffects[] = {
     {"dbr", "policy_samples", "policy_samples: 2"},
     {"dbr", "divergence_samples", "divergence_samples: 3", "divergence: MMD_LAPLACIAN"},
     {"dbr", "advantage",
-     "advantage: SIL"},  // ARM_CUMULATIVE is the replay server's (tests/learner/runtime/trainer_test.cc)
+     "advantage: SIL"},  // the replay server applies ARM_CUMULATIVE (tests/learner/runtime/trainer_test.cc)
     {"dbr", "munchausen_weight", "munchausen_weight: 0.9"},
 
     {"sac", "first_temperature", "first_temperature: 0.1"},
@@ -109,8 +109,8 @@ AlgorithmSpec SpecOf(const std::string& algorithm, const std::string& settings, 
 
 using Networks = std::vector<std::pair<std::string, std::vector<float>>>;
 
-// The exported networks after kUpdates updates on batches that the seed decides; empty where the algorithm
-// does not serve these actions, or not with these settings.
+// Returns the exported networks after kUpdates updates on batches that the random seed decides. Empty where
+// the algorithm does not serve these actions, or not with these settings.
 Networks Train(const AlgorithmSpec& spec) {
   const auto algorithm = MakeAlgorithm(spec);
   if (!algorithm.ok()) return {};

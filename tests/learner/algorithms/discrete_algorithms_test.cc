@@ -1,4 +1,4 @@
-// That Double DQN and discrete SAC solve small problems with known answers.
+// Tests that Double DQN and discrete SAC solve small problems with known answers.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -35,7 +35,7 @@ TEST_F(DdqnTinyProblem, TheFirstTargetIsTheTargetNetworksViewOfTheOnlineNetworks
   Ddqn<double> ddqn(spec);
   Rng rng(5);
   const auto batch = RandomBatch<double>(spec, 16, rng);
-  // Some steps first, with a target that lags, so that the two networks differ.
+  // Some steps come first, with a slow target, so that the two networks differ.
   for (int i = 0; i < 20; ++i) ASSERT_TRUE(ddqn.Update(batch, batch, batch).ok());
   TensorFile file;
   ddqn.Save(&file);
@@ -66,8 +66,8 @@ TEST_F(DdqnTinyProblem, TheFirstTargetIsTheTargetNetworksViewOfTheOnlineNetworks
 
 using DiscreteSacTinyProblem = TinyProblem;
 
-// With a fixed temperature T the soft values are V(s) = T log sum_a exp(Q(s, a) / T), and pi the softmax of Q
-// / T.
+// With a fixed temperature T the soft values are V(s) = T log sum_a exp(Q(s, a) / T), and pi is the softmax
+// of Q / T.
 TEST_F(DiscreteSacTinyProblem, ATwoStateChainHasItsClosedFormSoftValues) {
   constexpr double kTemperature = 0.5;
   config_.mutable_discrete_sac()->set_first_temperature(kTemperature);
@@ -93,7 +93,7 @@ TEST_F(DiscreteSacTinyProblem, TheTemperatureBringsTheEntropyToItsTarget) {
   EXPECT_NEAR(Metric("train/policy_entropy"), 0.5 * std::log(2.0), 0.01);
   EXPECT_GT(view_.policy(1, 0), 0.8f);
   EXPECT_EQ(view_.policy(2, 0), 0);
-  // The temperature at which the softmax of Q / T = (0, 1) / T has that entropy: T log(p / (1 - p)) = 1.
+  // At this temperature the softmax of Q / T = (0, 1) / T has that entropy: T log(p / (1 - p)) = 1.
   const double p = view_.policy(1, 0);
   EXPECT_NEAR(Metric("train/temperature"), 1 / std::log(p / (1 - p)), 0.02);
 }

@@ -1,4 +1,4 @@
-// Small problems with closed-form answers, and what algorithms say of them after training.
+// Small problems with closed-form answers, and the results of algorithms after training on them.
 #pragma once
 
 #include <memory>
@@ -11,9 +11,9 @@
 
 namespace dbr {
 
-// A finite problem over one-hot states. Data: uniformly random states and legal actions.
+// A finite problem over one-hot states. Its data has uniformly random states and legal actions.
 struct KnownProblem {
-  // What follows an action in a state.
+  // The result of an action in a state.
   struct Outcome {
     double reward = 0;
     int next_state = 0;
@@ -23,12 +23,12 @@ struct KnownProblem {
   int states = 1;
   double discount = 0;
   Outcome (*outcome)(int state, double action) = nullptr;
-  bool (*legal)(int state, int action) = nullptr;  // discrete; null: all are
+  bool (*legal)(int state, int action) = nullptr;  // for discrete actions; null: all are legal
 };
 
-// The config, other than its defaults, by which the named algorithm should solve such problems in a few
-// hundred updates. Constraints are loosened so far that the best policy keeps them, and entropies priced low.
-// Fails the test where the name is not known here.
+// Returns the config with which the named algorithm should solve such problems in a few hundred updates.
+// Constraints are so loose that the best policy satisfies them, and entropy has a low weight. Fails the test
+// for an unknown name.
 AlgorithmConfig ProblemSolvingConfig(const AlgorithmId& id);
 
 // An algorithm after `updates` updates on the problem's data, and what it has learned.
@@ -39,13 +39,13 @@ class TrainedOnProblem {
   const Algorithm& algorithm() const { return *algorithm_; }
   bool Has(const std::string& network) const { return policy_->snapshot().Find(network) != nullptr; }
 
-  // The action in each state [1 x states] by `mode`.
+  // Returns the action in each state [1 x states], chosen by `mode`.
   MatrixX<float> Act(ActingMode mode);
-  // Q(s, a), the smaller twin.
+  // Returns Q(s, a), the smaller twin.
   double Value(int state, double action);
-  // The probability that the named policy gives to an action; discrete.
+  // Returns the probability that the named policy gives to an action. Discrete actions only.
   double Probability(const std::string& network, int state, int action);
-  // The named Gaussian policy's mean after the tanh; continuous, one dimension.
+  // Returns the named Gaussian policy's mean after the tanh. Continuous actions of one dimension only.
   double Mean(const std::string& network, int state);
 
  private:

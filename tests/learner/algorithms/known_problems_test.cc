@@ -1,4 +1,4 @@
-// Every algorithm of the registry on small problems whose answer is known in closed form.
+// Tests every algorithm of the registry on small problems with answers in closed form.
 #include "tests/learner/algorithms/known_problems.h"
 
 #include <gtest/gtest.h>
@@ -11,9 +11,10 @@
 namespace dbr {
 namespace {
 
-// Discrete. Action 1 goes to the other state for nothing, action 0 stays: in state 0 for 0.2, in state 1
-// for 1. With gamma = 0.5: Q*(1, stay) = 1 / (1 - 0.5) = 2, Q*(0, go) = 0.5 * 2 = 1, Q*(0, stay) = 0.2 + 0.5
-// * 1 = 0.7, Q*(1, go) = 0.5 * 1 = 0.5. The best action in state 0 is the one that pays less at once.
+// Discrete actions. Action 1 goes to the other state with reward 0. Action 0 stays, with reward 0.2 in state
+// 0 and 1 in state 1. With gamma = 0.5: Q*(1, stay) = 1 / (1 - 0.5) = 2, Q*(0, go) = 0.5 * 2 = 1, Q*(0, stay)
+// = 0.2 + 0.5 * 1 = 0.7, Q*(1, go) = 0.5 * 1 = 0.5. The best action in state 0 is the one with the smaller
+// immediate reward.
 constexpr int kStay = 0, kGo = 1;
 const KnownProblem kTwoStates{.actions = {ActionKind::kDiscrete, 2},
                               .states = 2,
@@ -23,9 +24,9 @@ const KnownProblem kTwoStates{.actions = {ActionKind::kDiscrete, 2},
                                                      : KnownProblem::Outcome{state == 0 ? 0.2 : 1, state};
                               }};
 
-// The same with a third action, "feast": state 1 has it, for 1.5, staying; in state 0 it is illegal. So
-// V*(1) = 1.5 / (1 - 0.5) = 3, Q*(1, stay) = 1 + 0.5 * 3 = 2.5, Q*(0, go) = 1.5, Q*(0, stay) = 0.2 + 0.5
-// * 1.5 = 0.95, Q*(1, go) = 0.75; a target that forgot the mask would take what Q says of a feast in state 0.
+// The same with a third action, "feast". In state 1 it has reward 1.5 and stays; in state 0 it is illegal. So
+// V*(1) = 1.5 / (1 - 0.5) = 3, Q*(1, stay) = 1 + 0.5 * 3 = 2.5, Q*(0, go) = 1.5, Q*(0, stay) = 0.2 + 0.5 *
+// 1.5 = 0.95, Q*(1, go) = 0.75. A target without the mask would use Q of a feast in state 0.
 constexpr int kFeast = 2;
 const KnownProblem kIllegalFeast{
     .actions = {ActionKind::kDiscrete, 3},
@@ -36,9 +37,9 @@ const KnownProblem kIllegalFeast{
     },
     .legal = [](int state, int action) { return action != kFeast || state == 1; }};
 
-// Continuous. The states take turns whatever the action a in [-1, 1]; state 0 pays 1 - (a - 0.5)^2, state 1
-// -(a + 0.3)^2. So a* = (0.5, -0.3), V*(0) = 1 + 0.5 V*(1), V*(1) = 0.5 V*(0): V* = (4/3, 2/3), and
-// Q*(s, a) = V*(s) - (a - a*_s)^2.
+// Continuous actions a in [-1, 1]. The states alternate for every action. The reward is 1 - (a - 0.5)^2 in
+// state 0 and -(a + 0.3)^2 in state 1. So a* = (0.5, -0.3), V*(0) = 1 + 0.5 V*(1), V*(1) = 0.5 V*(0): V* =
+// (4/3, 2/3), and Q*(s, a) = V*(s) - (a - a*_s)^2.
 constexpr double kBest[] = {0.5, -0.3}, kBestValue[] = {4.0 / 3, 2.0 / 3};
 const KnownProblem kTwoTargets{.actions = {ActionKind::kContinuous, 1},
                                .states = 2,
@@ -61,10 +62,10 @@ class KnownProblems : public testing::TestWithParam<AlgorithmId> {
 
 constexpr int kUpdates = 500;
 
-// Discrete: expectations are exact, and a price of 0.02 on entropy moves Q by at most 0.02 log 3 gamma /
-// (1 - gamma) = 0.022. Continuous: V' is moved by SAC's and BRAC's prices (0.02; a variance of 0.01), TD3's
-// noise on the target (a variance of 0.04), AWAC's spread (temperature / 2 = 0.025) and DBR's and BEAR's
-// greatest of ten draws, and Q by gamma / (1 - gamma) = 1 times as much.
+// Discrete actions: expectations are exact, and an entropy weight of 0.02 moves Q by at most 0.02 log 3 gamma
+// / (1 - gamma) = 0.022. Continuous actions: V' is moved by the weights of SAC and BRAC (0.02; a variance of
+// 0.01), by TD3's noise on the target (a variance of 0.04), by AWAC's spread (temperature / 2 = 0.025) and by
+// the greatest of ten draws in DBR and BEAR. Q moves by gamma / (1 - gamma) = 1 times as much.
 constexpr double kDiscreteTolerance = 0.05, kContinuousTolerance = 0.1, kActionTolerance = 0.1;
 
 TEST_P(KnownProblems, TheTwoStatesHaveTheirClosedFormAnswer) {
@@ -89,7 +90,7 @@ TEST_P(KnownProblems, TheTwoStatesHaveTheirClosedFormAnswer) {
   }
 }
 
-// Every value is 1 / (1 - 0.5) = 2, and no action is better than another.
+// Every value is 1 / (1 - 0.5) = 2, and no action is better than another one.
 TEST_P(KnownProblems, ConstantRewardsGiveTheirDiscountedSum) {
   TrainedOnProblem trained(WithConstantRewards(discrete() ? kTwoStates : kTwoTargets), Config(), kUpdates);
   for (const int state : {0, 1}) {
@@ -137,7 +138,7 @@ INSTANTIATE_TEST_SUITE_P(Registry, KnownProblems, testing::ValuesIn(Algorithms()
   return info.param.name + (info.param.actions == ActionKind::kDiscrete ? "Discrete" : "Continuous");
 });
 
-// One state, episodes of one step: what DBR's two behaviour policies are fitted to is known.
+// One state and episodes of one step, so that the data of DBR's two behaviour policies is known.
 class Bandit : public testing::TestWithParam<DbrConfig::Constraint> {
  protected:
   static AlgorithmConfig Config(ActionKind actions) {
@@ -148,8 +149,8 @@ class Bandit : public testing::TestWithParam<DbrConfig::Constraint> {
   }
 };
 
-// Actions 0 and 1 pay 1, the others 0. While pi takes any of the others V is between: D+ holds the first two,
-// D- the others.
+// Actions 0 and 1 have reward 1, the others 0. While pi takes any of the others, V is between 0 and 1. Then
+// D+ holds the first two, and D- the others.
 TEST_P(Bandit, BetaPlusTakesTheGoodActionsAndBetaMinusTheBad) {
   const KnownProblem problem{.actions = {ActionKind::kDiscrete, 4},
                              .states = 1,
@@ -170,8 +171,8 @@ TEST_P(Bandit, BetaPlusTakesTheGoodActionsAndBetaMinusTheBad) {
   EXPECT_GT(distance, 0.9);
 }
 
-// The reward is the action a: D+ lies above V and D- below it. pi climbs to the greatest action, and V with
-// it; D+ is then the few rows up there, D- nearly all the data, whose mean is 0.
+// The reward is the action a, so D+ is above V and D- below it. pi climbs to the greatest action, and V with
+// it. D+ is then the few rows near there, and D- nearly all the data, whose mean is 0.
 TEST_P(Bandit, TheMeansOfBetaPlusAndBetaMinusLieOnEitherSideOfTheGoodAndTheBad) {
   const KnownProblem problem{.actions = {ActionKind::kContinuous, 1},
                              .states = 1,

@@ -13,7 +13,7 @@
 
 namespace dbr {
 
-// Trains on transitions that are all drawn in each batch, partitioned by the newest advantages. A test sets
+// Trains on batches that always hold all transitions, partitioned by the newest advantages. A test sets
 // `config_` first; the default is DBR.
 class TinyProblem : public testing::Test {
  protected:
@@ -28,7 +28,7 @@ class TinyProblem : public testing::Test {
     config_.set_target_tau(0.05);
   }
 
-  // One state, three actions, each four times: action 1 is worth 1, the others nothing.
+  // One state with three actions, each four times. Action 1 has reward 1, the others 0.
   static std::vector<Step> Bandit() {
     std::vector<Step> steps;
     for (int copy = 0; copy < 4; ++copy) {
@@ -37,14 +37,14 @@ class TinyProblem : public testing::Test {
     return steps;
   }
 
-  // State 0: action 0 goes on to state 1 for nothing, action 1 ends with 0.3. State 1: action 0 ends with 1,
-  // action 1 with -1. So Q*(1, .) = (1, -1) and Q*(0, .) = (0.9, 0.3) for a discount of 0.9.
+  // State 0: action 0 goes to state 1 with reward 0, and action 1 ends with 0.3. State 1: action 0 ends with
+  // 1, and action 1 with -1. So Q*(1, .) = (1, -1) and Q*(0, .) = (0.9, 0.3) for a discount of 0.9.
   static std::vector<Step> Chain() {
     return {{0, 0, 0, 0.9f, 1}, {0, 1, 0.3f, 0, 0}, {1, 0, 1, 0, 0}, {1, 1, -1, 0, 0}};
   }
 
-  // Leaves what the policy says of each state in view_. Actions from `legal` on are illegal in every state;
-  // 0: none is.
+  // Trains, and stores the policy's view of each state in view_. Actions from `legal` on are illegal in every
+  // state. 0 means that none is.
   void Train(const std::vector<Step>& steps, int states, int actions, int updates, int legal = 0) {
     masks_ = MatrixX<float>::Ones(actions, states);
     if (legal > 0) masks_.bottomRows(actions - legal).setZero();
@@ -70,7 +70,7 @@ class TinyProblem : public testing::Test {
     view_ = runner_.View(**policy, MatrixX<float>::Identity(states, states), masks_);
   }
 
-  // The newest update's metric of that name.
+  // Returns the newest update's metric of that name.
   double Metric(const std::string& name) const {
     for (const UpdateMetric& metric : algorithm_->metrics()) {
       if (metric.name == name) return metric.value;

@@ -26,7 +26,7 @@ using Json = nlohmann::json;
 
 const absl::Time kStart = absl::FromUnixSeconds(1700000000);
 
-// What TensorBoard shows of one event.
+// The parts of an event that TensorBoard shows.
 struct Event {
   double wall_time = 0;
   std::uint64_t step = 0;
@@ -63,7 +63,7 @@ void ReadScalar(const std::string& bytes, Event* event) {
   event->scalars[value.field(0).length_delimited()] = BitsAs<float>(value.field(1).fixed32());
 }
 
-// The Event message by its field numbers: 1 wall_time, 2 step, 3 file_version, 5 summary (1: values).
+// Reads the Event message by its field numbers: 1 wall_time, 2 step, 3 file_version, 5 summary (1: values).
 Event ReadEvent(const std::string& bytes) {
   UnknownFieldSet fields, summary;
   EXPECT_TRUE(fields.ParseFromString(bytes));
@@ -81,7 +81,7 @@ Event ReadEvent(const std::string& bytes) {
   return event;
 }
 
-// All events of a file, every checksum verified.
+// Reads all events of a file and verifies every checksum.
 std::vector<Event> ReadEvents(const std::string& path) {
   const std::string bytes = ReadFile(path).value();
   std::vector<Event> events;

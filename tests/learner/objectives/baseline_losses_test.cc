@@ -1,4 +1,4 @@
-// The losses of BRAC, TD3 and AWAC: every gradient against central differences in double.
+// Tests the losses of BRAC, TD3 and AWAC: every gradient against central differences in double.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -76,7 +76,7 @@ TEST_F(BehaviorKlTest, AClippedLogStdHasNoGradient) {
 
 class DeterministicPolicyTest : public PolicyLossTest {
  protected:
-  // The loss at log-stds pinned as TD3 pins them.
+  // Returns the loss with the log-stds fixed as in TD3.
   double Loss(const Matrix& mean, Matrix* gradient) {
     Matrix output = Matrix::Constant(2 * kDimensions, kStates, kPolicyLogStd.min);
     output.topRows(kDimensions) = mean;
@@ -133,7 +133,8 @@ TEST(AdvantageWeightsTest, DoNotLoseANaN) {
   EXPECT_TRUE(std::isnan(weights[0]));
 }
 
-// AWAC's whole policy loss, through the network's parameters; a learning rate of 0 lets Fit stand still.
+// Checks AWAC's whole policy loss through the network's parameters. With a learning rate of 0, Fit changes
+// nothing.
 TEST(WeightedLikelihoodTest, GradientMatchesDifferencesWithTheWeightsConstant) {
   Rng rng(32);
   TrainedNetwork<double> network(MlpShape(kObservation, {6}, 2 * kDimensions), 0, /*with_target=*/false, rng);

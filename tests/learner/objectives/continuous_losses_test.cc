@@ -1,5 +1,5 @@
-// The losses over continuous actions: every gradient against central differences in double, through the
-// critics and the draws too.
+// Tests the losses over continuous actions: every gradient against central differences in double, also
+// through the critics and the draws.
 #include "learner/objectives/continuous_losses.h"
 
 #include <gtest/gtest.h>
@@ -165,7 +165,7 @@ class ObjectiveTest : public testing::TestWithParam<Case> {
     return objective_.Compute(options_, {pi, plus_, minus_}, observations_, noise_, kAlpha, &critics_,
                               d_output);
   }
-  // The loss with the threshold held constant, unless it repels.
+  // Returns the loss with a constant threshold, unless repel_negative is set.
   double Objective(const Matrix& output, const PolicyLoss<double>& at) {
     Matrix unused;
     const PolicyLoss<double> moved = Loss(output, &unused);

@@ -1,5 +1,5 @@
-// The losses over discrete actions: every gradient against central differences in double, through the
-// networks too.
+// Tests the losses over discrete actions: every gradient against central differences in double, also through
+// the networks.
 #include "learner/objectives/discrete_losses.h"
 
 #include <gtest/gtest.h>
@@ -51,7 +51,8 @@ class PolicyLossTest : public testing::TestWithParam<Case> {
     return DualBehaviorPolicyLoss<double>(options_, Softmax(logits, masks_), q1_, q2_, plus_, minus_, kAlpha,
                                           &workspace, gradient);
   }
-  // The loss with what the definition holds constant held constant: the threshold, unless it repels.
+  // Returns the loss. What the definition holds constant is constant here: the threshold, unless
+  // repel_negative is set.
   double Objective(const Matrix& logits, const PolicyLoss<double>& at) {
     Matrix unused;
     const PolicyLoss<double> moved = Loss(logits, &unused);

@@ -1,5 +1,6 @@
-// What each input of DBR's update may move: pairs of updates from the same state that differ in one input
-// alone, compared tensor by tensor. A gradient that flows where it should not shows as a tensor too many.
+// Tests what each input of DBR's update may change. Two updates start from the same state and differ in one
+// input; the test compares their tensors. A gradient that flows where it should not changes one tensor too
+// many.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -28,7 +29,7 @@ class StopGradients : public testing::TestWithParam<ActionKind> {
   DbrConfig& dbr() { return *spec_.config.mutable_dbr(); }
   bool discrete() const { return GetParam() == ActionKind::kDiscrete; }
 
-  // The state after one update.
+  // Returns the state after one update.
   TensorFile Updated(const AlgorithmSpec& spec, const Batches& batches) {
     const auto algorithm = MakeAlgorithm(spec);
     EXPECT_TRUE(algorithm.ok()) << algorithm.status();
@@ -37,8 +38,8 @@ class StopGradients : public testing::TestWithParam<ActionKind> {
     (*algorithm)->Save(&file);
     return file;
   }
-  // The networks, by name, of which some tensor differs: "policy", "critics", "beta_plus", "beta_minus",
-  // "log_alpha".
+  // Returns the names of the networks with a tensor that differs: "policy", "critics", "beta_plus",
+  // "beta_minus", "log_alpha".
   static std::set<std::string> Differing(const TensorFile& one, const TensorFile& other) {
     std::set<std::string> names;
     for (const auto& [name, tensor] : one.tensors) {
@@ -82,7 +83,8 @@ TEST_P(StopGradients, DMinusMovesBetaMinusAloneWhereTheConstraintIsFixed) {
 TEST_P(StopGradients, DMinusReachesADynamicThresholdAndSoTheMultiplier) {
   dbr().set_constraint(DbrConfig::DYNAMIC_MAX);
   dbr().set_epsilon(1e-9);  // D(pi, beta-) is the larger one
-  // The multiplier's first step has a size of its own, whatever the violation: its Adam's moments tell.
+  // The multiplier's first step has the same size for any violation. The moments of its Adam show the
+  // difference.
   EXPECT_THAT(MovedByMinus(), UnorderedElementsAre("beta_minus", "log_alpha"));
 }
 
@@ -102,8 +104,8 @@ TEST_P(StopGradients, WithAValuePenaltyDPlusMovesTheCriticsToo) {
   EXPECT_THAT(MovedByPlus(), UnorderedElementsAre("beta_plus", "policy", "log_alpha", "critics"));
 }
 
-// The discrete policy's step takes the critics from before their step, so that it does not see the rewards of
-// this update; the continuous one goes through the critics after it.
+// The discrete policy's step uses the critics from before their step, so it does not see the rewards of this
+// update. The continuous one uses the critics after their step.
 TEST_P(StopGradients, RewardsMoveTheCriticsAndNeitherBehaviour) {
   const auto moved = MovedByBatches([](Batches* batches) { batches->uniform.rewards *= 2; });
   if (discrete()) {

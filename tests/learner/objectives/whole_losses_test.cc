@@ -1,6 +1,6 @@
-// DBR's whole policy loss by differences in double, for each constraint with each divergence, repel_negative
-// and normalize_q on and off: the single cases of discrete_losses_test and continuous_losses_test choose from
-// these. Epsilon is such that D(pi, beta-) is the threshold of both dynamic constraints.
+// Tests DBR's whole policy loss by differences in double, for each constraint with each divergence, with
+// repel_negative and normalize_q on and off. discrete_losses_test and continuous_losses_test test single
+// cases of these. Epsilon is such that D(pi, beta-) is the threshold of both dynamic constraints.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -36,7 +36,7 @@ PolicyLossOptions OptionsOf(const Grid& grid) {
           .entropy_weight = kEntropyWeight};
 }
 
-// Without a constraint alpha is 0.
+// Returns alpha, which is 0 without a constraint.
 double AlphaOf(const Grid& grid) {
   return std::get<0>(grid) == DbrConfig::NONE ? 0 : 1.7;
 }
@@ -47,8 +47,9 @@ std::string NameOf(const testing::TestParamInfo<Grid>& info) {
          (repel_negative ? "_Repels" : "") + (normalize_q ? "_NormalizesQ" : "");
 }
 
-// The loss at `moved`, put together again from its figures, with all that the definition holds constant as it
-// was `at` the point where the gradient is taken: the scale of Q, and the threshold unless it repels.
+// Returns the loss at `moved`, computed again from its terms. Everything that the definition holds constant
+// is taken from `at`, the point of the gradient: the scale of Q, and the threshold unless repel_negative is
+// set.
 double Objective(const Grid& grid, const PolicyLoss<double>& moved, const PolicyLoss<double>& at,
                  double scale) {
   const auto [constraint, divergence, repel_negative, normalize_q] = grid;
@@ -86,7 +87,7 @@ TEST_P(DiscreteLoss, GradientAgreesWithDifferences) {
                                           AlphaOf(GetParam()), &workspace, gradient);
   };
   const Matrix p = softmax(logits).probabilities;
-  double scale = 0;  // the mean under pi of the size of the twin that is worth less
+  double scale = 0;  // the mean under pi of the absolute value of the twin with the smaller expectation
   for (int j = 0; j < kStates; ++j) {
     const auto& smaller = p.col(j).dot(q1.col(j)) <= p.col(j).dot(q2.col(j)) ? q1 : q2;
     scale += p.col(j).dot(smaller.col(j).cwiseAbs()) / kStates;
@@ -123,7 +124,7 @@ TEST_P(ContinuousLoss, GradientAgreesWithDifferences) {
   };
   Matrix gradient, unused;
   const PolicyLoss<double> at = loss(output, &gradient);
-  double scale = 0;  // the mean size of the smaller twin's mean over a state's draws
+  double scale = 0;  // the mean over states of the absolute value of the smaller twin's mean over the draws
   for (int j = 0; j < kStates; ++j) {
     double mean1 = 0, mean2 = 0;
     for (int k = j; k < kDraws * kStates; k += kStates) {

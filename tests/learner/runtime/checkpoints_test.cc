@@ -1,4 +1,4 @@
-// Checkpoints: the newest whole one loads, damaged ones are named.
+// Tests checkpoints: the newest complete one loads, and damaged ones are named.
 #include "learner/runtime/checkpoints.h"
 
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-// The policy service over a real socket: the newest snapshot, and nothing in between for those who are slow.
+// Tests the policy service over a real socket: slow subscribers get the newest snapshot and none in between.
 #include "learner/runtime/policy_service.h"
 
 #include <gmock/gmock.h>
@@ -66,7 +66,7 @@ TEST_F(PolicyServiceTest, StatusNamesTheSlowestSubscriber) {
   const auto reader = stub_->Subscribe(&context_, SubscribeRequest());
   PolicyMessage message;
   ASSERT_TRUE(reader->Read(&message));
-  // The version is entered after the write: the next message comes after that.
+  // The service records the version after the write, so the next message comes after that.
   service_.Publish(Snapshot(5));
   ASSERT_TRUE(reader->Read(&message));
   grpc::ClientContext context;

@@ -1,4 +1,4 @@
-// A handful of transitions, drawn from and relabelled as the replay server does it.
+// A few transitions that are drawn and relabelled as in the replay server.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,16 @@
 
 namespace dbr {
 
-// Draws with replacement from all transitions, from D+ (advantage >= 0) and from D- (advantage <= 0), and
-// takes an update's advantages as the labels of what it drew. A transition that no update drew is in neither
-// part. One thread.
+// Draws with replacement from all transitions, from D+ (advantage >= 0) and from D- (advantage <= 0). Takes
+// an update's advantages as the labels of the rows that it drew. A transition that no update drew is in
+// neither part. One thread at a time.
 class TinyReplay {
  public:
-  // rows: one column for each transition.
+  // `rows` has one column for each transition.
   TinyReplay(Batch rows, std::uint64_t seed)
       : rows_(std::move(rows)), advantages_(static_cast<std::size_t>(rows_.size()), kUnjudged), rng_(seed) {}
 
-  // The status of the first update that fails, else of the last one.
+  // Makes `updates` updates. Returns the status of the first one that fails, else of the last one.
   absl::Status Train(Algorithm* algorithm, int updates) {
     const BatchNeeds needs = algorithm->needs();
     for (int i = 0; i < updates; ++i) {
@@ -67,7 +67,7 @@ class TinyReplay {
   }
 
   const Batch rows_;
-  std::vector<float> advantages_;  // of each row
+  std::vector<float> advantages_;  // [rows]
   std::vector<std::size_t> members_;
   Batch uniform_, plus_, minus_;
   Rng rng_;

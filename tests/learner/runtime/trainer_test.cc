@@ -1,4 +1,4 @@
-// The learner against a real replay server: updates, advantages written back, checkpoints, continuation.
+// Tests the learner with a real replay server: updates, advantages written back, checkpoints, resumed runs.
 #include "learner/runtime/trainer.h"
 
 #include <gmock/gmock.h>
@@ -34,7 +34,7 @@ class TrainerTest : public testing::Test {
     metrics_ = std::move(metrics).value();
   }
 
-  // In the place of the one before.
+  // Starts a replay server in the place of the one before.
   void StartReplay(ReplayServerOptions options) {
     replay_.reset();
     options.server.address = "unix:" + folder_.path() + "/replay.sock";
@@ -45,7 +45,7 @@ class TrainerTest : public testing::Test {
 
   static TransitionLayout Layout() { return {5, 1, 3}; }
 
-  // Unjudged transitions.
+  // Inserts transitions without an advantage.
   void Insert(int count) {
     TransitionWriter writer({.address = replay_->address(), .name = "test", .layout = Layout()});
     const Batch batch = RandomBatch<float>(SmallSpec(), count, rng_);
@@ -87,9 +87,9 @@ class TrainerTest : public testing::Test {
     return std::make_unique<Trainer>(config, std::move(parts));
   }
 
-  // Runs until the service says that this run has finished, then stops.
+  // Runs until the service says that this run has finished, and then stops.
   void RunToTheEnd(Trainer* trainer) {
-    service_.SetStatus(LearnerStatus());  // not the end of a run before
+    service_.SetStatus(LearnerStatus());  // clears the end of an earlier run
     std::thread thread([&] { EXPECT_TRUE(trainer->Run().ok()); });
     const absl::Time deadline = absl::Now() + absl::Seconds(60);
     LearnerStatus status;
@@ -126,8 +126,8 @@ TEST_F(TrainerTest, TrainsWritesAdvantagesBackAndSaves) {
   EXPECT_EQ(policy->updates, kUpdates);
 }
 
-// The advantage ARM_CUMULATIVE from the config to the labels in the store: A_T = max(A_{T-1}, 0) + (Q - V),
-// whatever the sign, for every time that a transition is judged.
+// Follows the advantage ARM_CUMULATIVE from the config to the labels in the store: A_T = max(A_{T-1}, 0) + (Q
+// - V), for either sign, each time that a transition is judged.
 TEST_F(TrainerTest, CumulativeAdvantagesAddUpInTheReplay) {
   const auto config =
       ParseConfig("algorithm { dbr { advantage: ARM_CUMULATIVE } } replay { capacity: 1000 min_size: 64 }");
@@ -174,8 +174,8 @@ TEST_F(TrainerTest, ContinuesFromItsCheckpoint) {
   ASSERT_TRUE(saved.ok()) << saved.status();
   auto same = MakeTrainer(kUpdates);
   ASSERT_TRUE(same->Load(saved->file).ok());
-  RunToTheEnd(same.get());  // makes no update, and saves
-  same.reset();             // before what it draws from
+  RunToTheEnd(same.get());  // it makes no update, and saves
+  same.reset();             // it ends before the server that it draws from
   const auto saved_again = Checkpoints(RunFolder{folder_.path()}.checkpoints(), 3).LoadNewest();
   ASSERT_TRUE(saved_again.ok()) << saved_again.status();
   EXPECT_NE(saved_again->file.metadata, saved->file.metadata) << "of the same save: versions must go on";

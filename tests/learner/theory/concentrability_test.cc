@@ -1,27 +1,25 @@
-// The theorem of the paper's section "From ARM and BEAR to DBR" on random small MDPs:
+// Tests the theorem of the paper's section "From ARM and BEAR to DBR" on random small MDPs:
 //   C(Pi_eps) <= C(beta+) * (1 + gamma / ((1 - gamma) f) * (1 - eps)).
 //
-// What can be proved. Write mu for the marginal that C divides by and f for the least mu(s) among the states
-// that Pi_eps reaches. A policy of Pi_eps acts only where beta+ >= eps, so that in each state it can be
-// coupled to beta+ with the same action at least eps of the time; after k steps the two have parted with
-// probability at most 1 - eps^k. Hence c(k) of Pi_eps is at most c(k) of beta+ plus (1 - eps^k) / f, and with
-// the weights of C
-//   C(Pi_eps) <= C(beta+) + (1 - eps) / f * (1 - gamma^2 eps) / (1 - gamma eps)^2             ("proven"
-//   below)
-// for every mu. C(beta+) >= 1, since p_k, weighted and summed, and mu both sum to 1. So the printed form
-// follows where gamma / (1 - gamma) >= (1 - gamma^2 eps) / (1 - gamma eps)^2, which for eps = 0.05 is gamma
-// >= 0.51. Where the print goes further than the proof:
-//   1. f as printed is the greater of the least mu_{beta+}(s) and the least mu_{beta-}(s). The proof divides
-//   by
-//      mu_{beta+}, so that only the former can stand there.
-//   2. For small gamma the printed form can fail: C weighs no step before the first, so that C(Pi_eps) does
-//   not
-//      shrink to C(beta+) as gamma goes to 0, but the printed factor shrinks to 1.
-//   3. The total variation of the proof, gamma / (1 - gamma) * (1 - eps), is that of the usual discounted
-//      marginal, not of the proof's own formula; and the ratio of the Cs is not the supremum of the ratio of
-//      the marginals, for C has the maximum over states inside its sum.
-// The tests hold the proven bound everywhere, the printed one with the proof's f from gamma = 0.51 on, and
-// show the other two failing.
+// What can be proved: write mu for the marginal that C divides by, and f for the least mu(s) among the states
+// that Pi_eps reaches. A policy of Pi_eps acts only where beta+ >= eps. So in each state it can be coupled to
+// beta+ with the same action at least eps of the time. After k steps the two have separated with probability
+// at most 1 - eps^k. Hence c(k) of Pi_eps is at most c(k) of beta+ plus (1 - eps^k) / f. With the weights of
+// C this gives the "proven" bound, for every mu:
+//   C(Pi_eps) <= C(beta+) + (1 - eps) / f * (1 - gamma^2 eps) / (1 - gamma eps)^2
+// C(beta+) >= 1, because mu sums to 1 and so does the weighted sum of p_k. So the printed form follows where
+// gamma / (1 - gamma) >= (1 - gamma^2 eps) / (1 - gamma eps)^2. For eps = 0.05 that is gamma >= 0.51.
+//
+// Where the printed theorem goes further than the proof:
+//   1. The printed f is the greater of the least mu_{beta+}(s) and the least mu_{beta-}(s). The proof divides
+//      by mu_{beta+}, so only the former can be f.
+//   2. For small gamma the printed form can fail. C has no weight on steps before the first, so C(Pi_eps)
+//      does not shrink to C(beta+) as gamma goes to 0. But the printed factor shrinks to 1.
+//   3. The total variation in the proof, gamma / (1 - gamma) * (1 - eps), is that of the usual discounted
+//      marginal, not of the proof's own formula. And the ratio of the Cs is not the supremum of the ratio of
+//      the marginals, because C has the maximum over states inside its sum.
+// The tests expect the proven bound everywhere, and the printed one with the proof's f for gamma >= 0.51.
+// They show the printed one fail with the printed f, and for a small gamma.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -33,25 +31,25 @@
 namespace dbr::tabular {
 namespace {
 
-// Both sides of the theorem in one MDP.
+// The two sides of the theorem in one MDP.
 struct Bounds {
   double c_set = 0;      // C(Pi_eps)
   double c_plus = 0;     // C(beta+)
   double f_plus = 0;     // the least mu_{beta+}(s)
-  double f_printed = 0;  // the greater of that and the least mu_{beta-}(s)
+  double f_printed = 0;  // the greater of f_plus and the least mu_{beta-}(s)
   double discount = 0, epsilon = 0;
 
   double Proven() const {
     const double shared = 1 - discount * epsilon;
     return c_plus + (1 - epsilon) / f_plus * (1 - discount * discount * epsilon) / (shared * shared);
   }
-  // Where the printed form follows from the proven one, C(beta+) being at least 1.
+  // Whether the printed form follows from the proven one. It uses C(beta+) >= 1.
   bool PrintedFollows() const {
     const double shared = 1 - discount * epsilon;
     return discount / (1 - discount) >= (1 - discount * discount * epsilon) / (shared * shared);
   }
   double Printed(double f) const { return c_plus * (1 + discount / ((1 - discount) * f) * (1 - epsilon)); }
-  // But for rounding, and what is left of the series.
+  // Whether the bound holds, except for rounding and the rest of the series.
   bool Within(double bound) const { return c_set <= bound * (1 + 1e-6); }
 };
 
@@ -73,8 +71,8 @@ Bounds BoundsOf(const Problem& problem, double epsilon, double discount, Margina
           .epsilon = epsilon};
 }
 
-// 4 to 6 states, 3 actions, and behaviours such that Pi_eps has an action in every state (else it is empty,
-// and the theorem says nothing).
+// Draws 4 to 6 states, 3 actions, and behaviour policies for which Pi_eps has an action in every state. (Else
+// Pi_eps is empty, and the theorem says nothing.)
 Problem RandomProblem(double epsilon, Rng& rng) {
   for (;;) {
     const int states = 4 + static_cast<int>(rng.Below(3)), actions = 3;
@@ -86,9 +84,9 @@ Problem RandomProblem(double epsilon, Rng& rng) {
   }
 }
 
-constexpr int kProblems = 50;  // of each eps and reading of mu
+constexpr int kProblems = 50;  // for each eps and each reading of mu
 
-// Both sides in random problems of several eps under both readings of mu.
+// Returns both sides in random problems, for several eps and both readings of mu.
 std::vector<Bounds> RandomBounds(double discount) {
   Rng rng(17);
   std::vector<Bounds> all;
@@ -107,7 +105,7 @@ TEST(GreatestReachTest, IsThatOfTheBestSequenceOfDeterministicPolicies) {
   const Problem problem = RandomProblem(0.05, rng);
   const Mdp& mdp = problem.mdp;
   const Matrix support = SupportOf(problem.plus, problem.minus, 0.05);
-  // All deterministic policies of the set.
+  // Makes all deterministic policies of the set.
   std::vector<Matrix> policies = {Matrix::Zero(mdp.actions, mdp.states)};
   for (int s = 0; s < mdp.states; ++s) {
     std::vector<Matrix> longer;
@@ -182,9 +180,10 @@ INSTANTIATE_TEST_SUITE_P(Discounts, Theorem, testing::Values(0.1, 0.55, 0.9, 0.9
   return "Discount" + std::to_string(static_cast<int>(100 * info.param + 0.5)) + "Percent";
 });
 
-// From state 0 action 0 stays and actions 1 and 2 lead to state 1, from where all lead back. beta- takes
-// action 2, which is not in Pi_eps, and so visits state 1 often, where beta+ is seldom: the printed f is
-// beta-'s and large. Pi_eps can be in state 1 after any step, at which beta+ has 0.015 times that.
+// In state 0, action 0 stays, and actions 1 and 2 lead to state 1. From there all actions lead back. beta-
+// takes action 2, which is not in Pi_eps, and so visits state 1 often, where beta+ seldom is. So the printed
+// f is that of beta- and large. Pi_eps can be in state 1 after any step, and beta+ has 0.015 times its
+// probability there.
 TEST(TheoremTest, APrintedFOfBetaMinusCanFail) {
   Problem problem{.mdp = {.states = 2, .actions = 3, .next = Matrix::Zero(2, 6), .start = Vector::Unit(2, 0)},
                   .plus = Matrix::Constant(3, 2, 1.0 / 3),
@@ -202,9 +201,9 @@ TEST(TheoremTest, APrintedFOfBetaMinusCanFail) {
   }
 }
 
-// Action a leads to state a, beta+ is uniform and so is the start: mu = (1/2, 1/2), C(beta+) = 1 and, by
-// always going to the same state, C(Pi_eps) = 2, whatever gamma is. The printed bound is 1 + 1.9 gamma / (1 -
-// gamma).
+// Action a leads to state a. beta+ and the start are uniform. So mu = (1/2, 1/2) and C(beta+) = 1. A policy
+// that always goes to the same state gives C(Pi_eps) = 2 for every gamma. The printed bound is 1 + 1.9 gamma
+// / (1 - gamma).
 TEST(TheoremTest, ThePrintedFormCanFailForASmallDiscount) {
   Problem problem{
       .mdp = {.states = 2, .actions = 2, .next = Matrix::Zero(2, 4), .start = Vector::Constant(2, 0.5)},

@@ -1,19 +1,18 @@
-// DBR's dynamic constraint on tables against the paper's set
+// Compares DBR's dynamic constraint, on tables, with the paper's set
 //   Pi_eps = {pi : pi(a|s) = 0 wherever beta+(a|s) < max(eps, beta-(a|s))}.
 //
-// What is true of D(pi, beta+) <= c with KL(pi || beta):
-//   1. c = min(eps', D(pi, beta-)) admits pi where KL(pi||beta+) <= eps' AND E_pi log(beta+ / beta-) >= 0;
-//      c = max where one of the two holds (each mean over the states).
-//   2. A deterministic policy has KL(pi||beta) = -log beta(a|s). So in a state, with eps' = -log eps, min
-//   admits
-//      exactly the deterministic policies of Pi_eps, beta+ >= max(eps, beta-); and max those with
-//      beta+ >= min(eps, beta-), whatever Pi_eps says.
-//   3. Min admits all of Pi_eps, the stochastic policies too; but not only them. KL bounds the mass outside
-//   and does
-//      not forbid it: if beta+ has the share b outside, an admitted pi has at most the p with
-//      p log(p/b) + (1-p) log((1-p)/(1-b)) = eps' (the chain rule, and convexity over states). beta+ itself
-//      is always admitted by min, and in Pi_eps only where b = 0.
-//   4. Max has no such bound: where beta- is smaller still, all of pi may sit on an action with beta+ < eps.
+// What is true about D(pi, beta+) <= c with KL(pi || beta):
+//   1. Min, c = min(eps', D(pi, beta-)), admits pi where KL(pi||beta+) <= eps' AND E_pi log(beta+ / beta-) >=
+//      0. Max, c = max(eps', D(pi, beta-)), admits pi where one of the two holds. (Each is a mean over the
+//      states.)
+//   2. A deterministic policy has KL(pi||beta) = -log beta(a|s). So in one state, with eps' = -log eps, min
+//      admits exactly the deterministic policies of Pi_eps, those with beta+ >= max(eps, beta-). Max admits
+//      those with beta+ >= min(eps, beta-), also outside Pi_eps.
+//   3. Min admits all of Pi_eps, stochastic policies too, and also others. KL bounds the mass outside the set
+//      and does not forbid it. If beta+ has the share b outside, an admitted pi has there at most the p with
+//      p log(p/b) + (1-p) log((1-p)/(1-b)) = eps' (by the chain rule, and by convexity over states). Min
+//      always admits beta+ itself, which is in Pi_eps only where b = 0.
+//   4. Max has no such bound. Where beta- is smaller still, all of pi may be on an action with beta+ < eps.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,7 +27,7 @@ namespace dbr::tabular {
 namespace {
 
 constexpr int kActions = 3;
-constexpr double kEpsilon = 0.05;  // of the set: a density
+constexpr double kEpsilon = 0.05;  // the eps of the set: a density
 
 Categorical<double> SoftmaxOf(const Matrix& logits) {
   Categorical<double> p;
@@ -36,10 +35,10 @@ Categorical<double> SoftmaxOf(const Matrix& logits) {
   return p;
 }
 
-// DBR's policy loss where the policy is a table of logits, and Q, beta+ and beta- are given.
+// DBR's policy loss for a policy that is a table of logits, with given Q, beta+ and beta-.
 struct TableProblem {
   Matrix plus, minus, q;  // [actions x states]
-  double epsilon = 0.05;  // of the constraint: nats
+  double epsilon = 0.05;  // the eps of the constraint: nats
 
   PolicyLoss<double> Loss(DbrConfig::Constraint constraint, const Categorical<double>& policy, double alpha,
                           Matrix* d_logits) const {
@@ -55,7 +54,7 @@ struct TableProblem {
   }
 };
 
-// Logits of the deterministic policy that takes `action` in the only state.
+// Returns the logits of the deterministic policy that takes `action` in the only state.
 Matrix Always(int action) {
   Matrix logits = Matrix::Constant(kActions, 1, -1e4);
   logits(action, 0) = 0;
@@ -122,12 +121,12 @@ TEST(DynamicConstraint, MinAdmitsBetaPlusAlthoughTheSetDoesNot) {
   EXPECT_EQ(SupportOf(problem.plus, problem.minus, kEpsilon).minCoeff(), 0);
 }
 
-// The mean over states of the probability of actions outside the support.
+// Returns the mean over states of the probability of actions outside the support.
 double MassOutside(const Matrix& policy, const Matrix& support) {
   return (policy.array() * (1 - support.array())).sum() / static_cast<double>(policy.cols());
 }
 
-// The greatest p with p log(p/b) + (1-p) log((1-p)/(1-b)) <= divergence.
+// Returns the greatest p with p log(p/b) + (1-p) log((1-p)/(1-b)) <= divergence.
 double GreatestShare(double b, double divergence) {
   double low = b, high = 1;
   for (int i = 0; i < 60; ++i) {
@@ -159,7 +158,7 @@ Trained Train(const TableProblem& problem, DbrConfig::Constraint constraint) {
   return trained;
 }
 
-// Q draws the policy out of the set, in every state; the constraint has to hold it.
+// Q pulls the policy out of the set in every state. The constraint must hold it.
 TEST(DynamicConstraint, UnderMinTheMassOutsideTheSetStaysWithinItsBound) {
   Rng rng(5);
   for (int i = 0; i < 20; ++i) {
@@ -175,9 +174,9 @@ TEST(DynamicConstraint, UnderMinTheMassOutsideTheSetStaysWithinItsBound) {
   }
 }
 
-// beta+ prefers the first action, beta- the second; the third is rare under both, but rarer under beta-.
-// Which is which differs from state to state. Q likes the third, which Pi_eps leaves out: beta+ is below eps
-// there.
+// beta+ prefers the first action and beta- the second. The third is rare under both, but rarer under beta-.
+// The order differs from state to state. Q prefers the third, which Pi_eps leaves out, because beta+ is below
+// eps there.
 TEST(DynamicConstraint, UnderMaxAllMassMayLeaveTheSetAndUnderMinLittleDoes) {
   constexpr int kStates = 5;
   TableProblem problem{.plus = Matrix(kActions, kStates),
@@ -205,7 +204,7 @@ TEST(DynamicConstraint, UnderMaxAllMassMayLeaveTheSetAndUnderMinLittleDoes) {
   EXPECT_LE(max.loss.divergence_plus, max.loss.threshold) << "the constraint as printed is kept all the same";
 }
 
-// Networks without hidden layers on one-hot states: their weights are the tables.
+// Networks without hidden layers on one-hot states, so that their weights are the tables.
 class SupportActing : public testing::Test {
  protected:
   static std::vector<float> TableOf(const Matrix& outputs) {
@@ -214,7 +213,7 @@ class SupportActing : public testing::Test {
     parameters.resize(parameters.size() + static_cast<std::size_t>(outputs.rows()), 0);  // no bias
     return parameters;
   }
-  // The actions that SUPPORT chooses in each state [1 x states].
+  // Returns the actions that SUPPORT chooses in each state [1 x states].
   MatrixX<float> Act(const TableProblem& problem) {
     const int states = static_cast<int>(problem.q.cols());
     PolicySnapshot snapshot;
@@ -239,8 +238,8 @@ class SupportActing : public testing::Test {
                     .ok());
     return actions;
   }
-  // 1 for every action that some Q makes SUPPORT choose. Where Q likes one action alone the others are as
-  // good.
+  // Returns 1 for every action that some Q makes SUPPORT choose. Each Q prefers one action, and the others
+  // tie.
   Matrix Chosen(TableProblem problem) {
     Matrix chosen = Matrix::Zero(problem.q.rows(), problem.q.cols());
     for (int liked = 0; liked < kActions; ++liked) {
@@ -262,7 +261,7 @@ TEST_F(SupportActing, ChoosesFromExactlyThePapersSet) {
     const TableProblem problem = RandomTables(4 + static_cast<int>(rng.Below(3)), rng);
     const Matrix support = SupportOf(problem.plus, problem.minus, kEpsilon), chosen = Chosen(problem);
     for (int s = 0; s < support.cols(); ++s) {
-      if (support.col(s).sum() == 0) continue;  // the next test's
+      if (support.col(s).sum() == 0) continue;  // the next test has these states
       EXPECT_EQ(Vector(chosen.col(s)), Vector(support.col(s)));
       left_out += static_cast<int>(kActions - support.col(s).sum());
     }

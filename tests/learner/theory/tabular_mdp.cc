@@ -12,7 +12,7 @@ double Exponential(Rng& rng) {
   return -std::log(1 - rng.Uniform());
 }
 
-// The greatest p(s) / mu(s) among the states with p(s) > 0.
+// Returns the greatest p(s) / mu(s) among the states with p(s) > 0.
 double GreatestRatio(const Vector& p, const Vector& mu) {
   double greatest = 0;
   for (Eigen::Index s = 0; s < p.size(); ++s) {
@@ -22,7 +22,8 @@ double GreatestRatio(const Vector& p, const Vector& mu) {
   return greatest;
 }
 
-// The series of C over next_probabilities(), which gives each state's probability after 1, 2, ... steps.
+// Sums the series of C over next_probabilities(), which returns each state's probability after 1, 2, ...
+// steps.
 template <class Next>
 double SumSeries(const Vector& mu, double discount, const Next& next_probabilities) {
   constexpr double kRest = 1e-9;
@@ -33,7 +34,7 @@ double SumSeries(const Vector& mu, double discount, const Next& next_probabiliti
     if (std::isinf(ratio)) return ratio;
     sum += k * power * ratio;
     power *= discount;
-    // The weights of the terms to come add up to gamma^k (1 + k (1 - gamma)).
+    // The weights of the remaining terms add up to gamma^k (1 + k (1 - gamma)).
     if (power * (1 + k * (1 - discount)) < kRest * least) return (1 - discount) * (1 - discount) * sum;
   }
 }
@@ -106,7 +107,7 @@ Vector GreatestReach::Next() {
 double LeastReached(const Mdp& mdp, const Matrix& support, const Vector& mu) {
   GreatestReach reach(mdp, support);
   double least = std::numeric_limits<double>::infinity();
-  // A state that is reached at all is reached within as many steps as there are states.
+  // A state that can be reached is reached within as many steps as there are states.
   for (int k = 1; k <= mdp.states; ++k) {
     const Vector greatest = reach.Next();
     for (int s = 0; s < mdp.states; ++s) {
