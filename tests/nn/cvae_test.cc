@@ -1,5 +1,5 @@
-// The conditional VAE: its gradients against central differences in double, its loss against the formula, and
-// the order of its samples.
+// Tests the conditional VAE: its gradients against central differences in double, its loss against the
+// formula, and the order of its samples.
 #include "nn/cvae.h"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ class CvaeTest : public testing::Test {
     return cvae_.Gradient({encoder, decoder}, {observations_, actions_, noise_}, kKlWeight, &d_encoder_,
                           &d_decoder_);
   }
-  // An encoder whose latent is the same for every input.
+  // Makes an encoder whose latent is the same for every input.
   Vector ConstantEncoder(double mean, double log_std) const {
     Vector encoder = Vector::Zero(shape_.encoder.parameter_count());
     encoder.tail(2 * kLatent).head(kLatent).setConstant(mean);
@@ -71,8 +71,7 @@ TEST_F(CvaeTest, ClipsTheLatentsLogStd) {
 }
 
 TEST_F(CvaeTest, TheNoiseMovesTheLatentByItsStd) {
-  // With the noise at 0 the decoder sees the mean: another log-std then changes nothing in the
-  // reconstruction.
+  // With noise 0 the decoder sees the mean, so another log-std does not change the reconstruction.
   const Matrix none = Matrix::Zero(kLatent, kStates);
   const auto reconstruction = [&](double log_std, const Matrix& noise) {
     return cvae_

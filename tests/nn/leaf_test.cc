@@ -1,5 +1,5 @@
-// The leaves of the continuous losses: against reference values of PyTorch in double, and against central
-// differences.
+// Tests the basic functions of the continuous losses against reference values from PyTorch in double and
+// against central differences.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -316,7 +316,7 @@ TEST(TanhGaussianTest, PathwiseGradientMatchesCentralDifferences) {
   const Gaussian g = RandomGaussian(3, 4, rng);
   const Matrix noise = Normals(3, 4, rng), d_action = Normals(3, 4, rng);
   const Vector d_log_prob = Normals(4, 1, rng);
-  // Any loss that is linear in actions and log-probabilities; a real one is so to first order.
+  // The loss is linear in actions and log-probabilities. To first order, every loss is.
   const auto loss = [&](const Gaussian& at) {
     TanhSample<double> sample;
     SampleTanhGaussian<double>(at.view(), noise, &sample);

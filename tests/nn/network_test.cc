@@ -1,4 +1,4 @@
-// The MLP, Adam, the categorical policy and acting: against reference values of PyTorch in double, and
+// Tests the MLP, Adam, the categorical policy and acting against reference values from PyTorch in double and
 // against central differences.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -86,7 +86,7 @@ TEST_P(MlpDepth, GradientsAgreeWithDifferences) {
   ExpectNear(dx_of_deltas, dx);
 }
 
-// Over several blocks of columns, one of them without a gradient at all.
+// Uses several blocks of columns, one of them without any gradient.
 TEST_P(MlpDepth, SamplesWithoutAGradientHaveNoneForTheirInput) {
   Rng rng(4);
   const MlpShape shape(4, GetParam(), 3);
@@ -233,7 +233,7 @@ TEST(MaskedCategorical, StaysFiniteForLargeLogits) {
   EXPECT_DOUBLE_EQ(p.probabilities(0, 0), 1);
 }
 
-// A policy without hidden layers whose outputs are its biases.
+// Makes a policy without hidden layers whose outputs are its biases.
 std::vector<float> Constant(const std::vector<float>& outputs) {
   std::vector<float> parameters(outputs.size(), 0.0f);  // weights [out x 1]
   parameters.insert(parameters.end(), outputs.begin(), outputs.end());
@@ -287,7 +287,7 @@ TEST_F(Acting, EachModeChoosesByItsOwnRule) {
 TEST_F(Acting, MasksHoldInEachMode) {
   EXPECT_EQ(Act(MODE, {0, 1, 1, 1}), 1);
   EXPECT_EQ(Act(GREEDY_Q, {1, 1, 1, 0}), 2);
-  EXPECT_EQ(Act(SUPPORT, {0, 1, 0, 1}), 1);  // none is supported: the greatest ratio
+  EXPECT_EQ(Act(SUPPORT, {0, 1, 0, 1}), 1);  // no action is supported, so it takes the greatest ratio
   for (int i = 0; i < 200; ++i) EXPECT_EQ(Act(SAMPLE, {0, 0, 1, 0}), 2);
 }
 

@@ -1,4 +1,4 @@
-// Comparing matrices, and gradients with central differences.
+// Compares matrices, and gradients with central differences.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 
 namespace dbr {
 
-// Nested lists [n][dimensions] as [dimensions x n], or [n][samples][dimensions] as [dimensions x n *
+// Returns nested lists [n][dimensions] as [dimensions x n], or [n][samples][dimensions] as [dimensions x n *
 // samples].
 inline MatrixX<double> ToMatrix(const nlohmann::json& rows) {
   if (rows[0][0].is_array()) {

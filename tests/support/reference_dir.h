@@ -1,4 +1,4 @@
-// Where the reference data of the tests lies.
+// Finds the reference data of the tests.
 #pragma once
 
 #include <cstdlib>
@@ -7,7 +7,7 @@
 
 namespace dbr {
 
-// The environment variable DBR_REFERENCE_DIR, or tests/reference of this tree.
+// Returns the environment variable DBR_REFERENCE_DIR, or tests/reference of this source tree.
 inline std::filesystem::path ReferenceDir() {
   const char* folder = std::getenv("DBR_REFERENCE_DIR");
   return folder != nullptr && *folder != '\0' ? folder : DBR_DEFAULT_REFERENCE_DIR;

@@ -1,4 +1,4 @@
-// Reading the JSON files of the reference data.
+// Reads the JSON files of the reference data.
 #pragma once
 
 #include <algorithm>
@@ -12,13 +12,13 @@
 
 namespace dbr {
 
-// A file and what it holds; not an object where the file is no JSON.
+// A file and its JSON. `json` is not an object where the file is not JSON.
 struct ReferenceFile {
   std::string name;
   nlohmann::json json;
 };
 
-// Every file "PREFIX*.json" of `folder` within the reference data, by name.
+// Returns every file "PREFIX*.json" of `folder` within the reference data, sorted by name.
 inline std::vector<ReferenceFile> ReferenceFiles(const std::string& folder, const std::string& prefix) {
   std::vector<ReferenceFile> files;
   std::error_code error;

@@ -1,4 +1,4 @@
-// A folder of a test's own.
+// A temporary folder for one test.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -11,7 +11,8 @@
 
 namespace dbr {
 
-// Made empty, removed with all that is in it. Its path is short enough for a unix socket.
+// The constructor makes it empty, and the destructor removes it with its contents. Its path is short enough
+// for a unix socket.
 class TempDir {
  public:
   TempDir() : path_(testing::TempDir() + "dbr-XXXXXX") { DBR_CHECK(mkdtemp(path_.data()) != nullptr); }

@@ -1,9 +1,9 @@
-// absl::Mutex and absl::CondVar over POSIX ones, for builds with ThreadSanitizer alone.
+// absl::Mutex and absl::CondVar on top of POSIX ones, only for builds with ThreadSanitizer.
 //
-// The distribution's Abseil is a shared library that ThreadSanitizer has not instrumented: it sees neither
+// The distribution's Abseil is a shared library that ThreadSanitizer has not instrumented. It sees neither
 // that a Mutex was taken nor that a waiter was woken, and reports every guarded member as a race. A program's
-// own definitions come before a shared library's, so those below take the place of Abseil's, for us and for
-// gRPC. Slower, and readers exclude each other; the contracts are the same.
+// own definitions come before a shared library's, so the definitions below replace Abseil's, for us and for
+// gRPC. They are slower, and readers exclude each other. The contracts are the same.
 #include <pthread.h>
 #include <sanitizer/tsan_interface.h>
 
@@ -17,11 +17,11 @@
 #include "absl/time/time.h"
 #include "core/check.h"
 
-// Named by the link options, so that a linker takes this file out of its archive.
+// The link options name this symbol, so that the linker takes this file out of its archive.
 extern "C" const int dbr_tsan_mutex = 1;
 
-// What these libraries do with memory inside the functions that ThreadSanitizer intercepts (free, memcpy) is
-// theirs: they order it by atomics that it does not see either.
+// These libraries use memory inside functions that ThreadSanitizer intercepts (free, memcpy). They order that
+// by atomics that it does not see either.
 extern "C" const char* __tsan_default_suppressions() {
   return "called_from_lib:libgrpc.so\n"
          "called_from_lib:libgrpc++.so\n"
@@ -34,15 +34,15 @@ extern "C" const char* __tsan_default_suppressions() {
          "called_from_lib:libabsl_strings.so\n"
          "called_from_lib:libabsl_cord.so\n"
          "called_from_lib:libabsl_cord_internal.so\n"
-         // The last owner of gRPC's pool of threads frees its condition variables; a shared_ptr's count in
-         // the uninstrumented library is what orders that.
+         // The last owner of gRPC's thread pool frees its condition variables. The count of a shared_ptr in
+         // the uninstrumented library orders that.
          "race:grpc_event_engine::experimental::ThreadPool::State\n";
 }
 
 namespace dbr {
 namespace {
 
-// What stands behind a Mutex. `changed` wakes those who wait for a condition: any unlock may have made it
+// The state of a Mutex. `changed` wakes those who wait for a condition, because any unlock may have made it
 // true.
 struct Lock {
   pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
@@ -64,7 +64,7 @@ struct Signal {
 static_assert(sizeof(absl::Mutex) == sizeof(std::atomic<void*>) &&
               sizeof(absl::CondVar) == sizeof(std::atomic<void*>));
 
-// The one word of a Mutex or CondVar, zero at first, holds the address of what stands behind it.
+// The only word of a Mutex or CondVar, which is zero at first, holds the address of its state.
 template <class Behind>
 std::atomic<Behind*>& WordOf(const void* object) {
   return *static_cast<std::atomic<Behind*>*>(const_cast<void*>(object));
@@ -81,7 +81,7 @@ Behind& Of(const void* object) {
   return *found;
 }
 
-// Every use of what stands behind ends with a release, and destroying it begins with an acquire: gRPC counts
+// Every use of the state ends with a release, and its destruction begins with an acquire. gRPC counts
 // references to the owners of its mutexes by atomics that ThreadSanitizer does not see.
 template <class Behind>
 void Destroy(const void* object) {
@@ -105,7 +105,7 @@ void UnlockIt(const absl::Mutex* mutex) {
   DBR_CHECK(pthread_mutex_unlock(&lock.mutex) == 0);
 }
 
-// False once `deadline` has passed.
+// Returns false once `deadline` has passed.
 bool WaitOn(pthread_cond_t* cond, pthread_mutex_t* mutex, absl::Time deadline) {
   if (deadline == absl::InfiniteFuture()) return pthread_cond_wait(cond, mutex) == 0;
   const timespec until = absl::ToTimespec(deadline);
@@ -125,7 +125,7 @@ bool AwaitIt(const absl::Mutex* mutex, const absl::Condition& condition, absl::T
   return true;
 }
 
-// True where the deadline passed first, as CondVar::WaitWithDeadline says it.
+// Returns true where the deadline passed first, as CondVar::WaitWithDeadline does.
 bool WaitForSignal(const absl::CondVar* cond_var, const absl::Mutex* mutex, absl::Time deadline) {
   Lock& lock = Of<Lock>(mutex);
   WakeWaiters(lock);
@@ -135,7 +135,7 @@ bool WaitForSignal(const absl::CondVar* cond_var, const absl::Mutex* mutex, absl
   return !in_time;
 }
 
-// The signal behind a CondVar, by whose waking the other thread may destroy it.
+// Returns the signal of a CondVar. Once it wakes the other thread, that thread may destroy it.
 pthread_cond_t* LastUse(const absl::CondVar* cond_var) {
   Signal& signal = Of<Signal>(cond_var);
   __tsan_release(&signal);

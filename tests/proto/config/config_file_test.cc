@@ -18,7 +18,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-// The lines of the error, the first without the "config: " in front where there is only one.
+// Returns the lines of the error. Where there is only one, without "config: " in front.
 std::vector<std::string> ErrorsOf(const std::string& text, const std::vector<std::string>& overrides = {}) {
   const absl::Status status = ParseConfig(text, overrides).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << "accepted: " << text;
@@ -214,7 +214,7 @@ TEST(PrintConfigTest, ReadsBackAsItself) {
   EXPECT_EQ(PrintConfig(again), text);
   EXPECT_EQ(again.algorithm().learning_rate(), config.algorithm().learning_rate());
   EXPECT_EQ(again.env().name(), config.env().name());
-  // Parsed again and printed, nothing is left to default.
+  // The printed config sets every field, so nothing is left to default when it is parsed.
   EXPECT_TRUE(MessageDifferencer::Equals(again, Parsed(PrintConfig(again))));
 }
 

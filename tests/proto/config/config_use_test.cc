@@ -1,5 +1,5 @@
-// No field of the config that nothing reads: each has an accessor's call in the sources of the rooms that it
-// is for. (tests/learner/algorithms/config_effect_test.cc proves more of the algorithms' fields: that they
+// Tests that every field of the config is read: its accessor is called in the sources of the folders that it
+// is for. (tests/learner/algorithms/config_effect_test.cc tests more for the algorithms' fields: that they
 // have an effect.)
 #include <google/protobuf/descriptor.h>
 #include <gtest/gtest.h>
@@ -19,7 +19,8 @@ namespace {
 using google::protobuf::Descriptor;
 using google::protobuf::FieldDescriptor;
 
-// Which folders read a message's fields. An algorithm's message is the learner's unless it stands here.
+// The folders that read a message's fields. The learner reads an algorithm's message unless it is listed
+// here.
 const std::map<std::string, std::vector<std::string>>& Readers() {
   static const auto* const readers = new std::map<std::string, std::vector<std::string>>{
       {"Config", {"actor", "learner", "replay", "deploy"}},
@@ -37,7 +38,7 @@ const std::map<std::string, std::vector<std::string>>& Readers() {
   return *readers;
 }
 
-// The code of a folder in one string, without comments.
+// Returns the code of a folder in one string, without comments.
 const std::string& CodeOf(const std::string& folder) {
   static auto* const cache = new std::map<std::string, std::string>;
   std::string& code = (*cache)[folder];
@@ -65,8 +66,8 @@ std::vector<std::string> FoldersFor(const Descriptor& message) {
   return found != Readers().end() ? found->second : std::vector<std::string>{"learner"};
 }
 
-// Calls `visit(message, field)` for every field of `message` and of the messages within it, each message
-// once.
+// Calls `visit(message, field)` for every field of `message` and of the messages within it. Visits each
+// message once.
 template <class Visit>
 void WalkFields(const Descriptor& message, std::map<std::string, bool>* seen, const Visit& visit) {
   if (std::exchange((*seen)[message.full_name()], true)) return;

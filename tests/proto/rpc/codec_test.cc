@@ -14,7 +14,7 @@ constexpr TransitionLayout kLayout{.observation_width = 3, .action_width = 1, .m
 constexpr TransitionLayout kWithReturns{
     .observation_width = 3, .action_width = 1, .mask_width = 2, .return_width = 1};
 
-// A batch of two transitions that differ in every field.
+// Makes a batch of two transitions that differ in every field.
 TransitionBatch TwoTransitions(const TransitionLayout& layout = kLayout) {
   TransitionBatch batch;
   SetLayout(layout, &batch);

@@ -35,8 +35,9 @@ std::string ToString(const grpc::ByteBuffer& buffer) {
              : "";
 }
 
-// Sends one message to a method by its name and gives the first answer's bytes; "" where the call failed. The
-// messages of the standard services are written by hand below: their generated classes are not packaged.
+// Sends one message to a method by its name. Returns the first answer's bytes, or "" where the call failed.
+// The messages of the standard services are written by hand below, because their generated classes are not
+// packaged.
 std::string CallByName(const std::string& address, const std::string& method, const std::string& request) {
   grpc::GenericStub stub(MakeChannel(address));
   grpc::ClientContext context;
@@ -121,7 +122,7 @@ TEST_F(ServerTest, AStaleSocketIsReplaced) {
   std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
   const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
   ASSERT_EQ(bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-  close(fd);  // as a killed server leaves it
+  close(fd);  // a killed server leaves such a socket
   const auto running = Start(socket_address());
   ASSERT_TRUE(running.ok()) << running.status();
   EXPECT_TRUE(IsServing(running->address));
