@@ -51,8 +51,8 @@ class Awac : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
   GaussianHead<Scalar> next_pi_;
   SampledActions<Scalar> draws_, next_draws_;
   CriticRegression<Scalar> regression_;
-  MatrixX<Scalar> noise_, next_noise_;
-  VectorX<Scalar> value_, next_value_, advantage_, weights_;
+  MatrixX<Scalar> noise_, next_noise_;  // [dimensions x value_samples * n], [dimensions x n]
+  VectorX<Scalar> value_, next_value_, advantage_, weights_;  // [n]
 };
 
 std::unique_ptr<Algorithm> MakeAwac(const AlgorithmSpec& spec);

@@ -61,8 +61,9 @@ class Brac : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
   GaussianHead<Scalar> pi_, next_pi_, next_beta_;
   SampledActions<Scalar> next_draws_;
   BehaviorKlObjective<Scalar> objective_;
+  // [dimensions x divergence_samples * n], [dimensions x n] and [2 * dimensions x n].
   MatrixX<Scalar> noise_, next_noise_, d_output_;
-  VectorX<Scalar> next_value_, next_kl_, value_;
+  VectorX<Scalar> next_value_, next_kl_, value_;  // [n]
 };
 
 std::unique_ptr<Algorithm> MakeBrac(const AlgorithmSpec& spec);

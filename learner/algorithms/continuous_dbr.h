@@ -76,8 +76,8 @@ class ContinuousDbr : public ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>> 
   DualBehaviorObjective<Scalar> objective_;
   GaussianDivergence<Scalar> penalty_;
   ObjectiveNoise<Scalar> noise_;
-  MatrixX<Scalar> next_noise_, d_output_;
-  VectorX<Scalar> next_value_, value_, log_prob_, bonus_;
+  MatrixX<Scalar> next_noise_, d_output_;  // [dimensions x target_samples * n], [2 * dimensions x n]
+  VectorX<Scalar> next_value_, value_, log_prob_, bonus_;  // [n]
   SelfImitation<Scalar> imitation_;
 };
 

@@ -55,8 +55,8 @@ class DiscreteBear : public ActorCriticAlgorithm<BearNetworks<Scalar>> {
   CategoricalLikelihood<Scalar> beta_;
   Categorical<Scalar> pi_, next_pi_;
   PolicyLossWorkspace<Scalar> workspace_;
-  VectorX<Scalar> target_, value_;
-  MatrixX<Scalar> d_logits_;
+  VectorX<Scalar> target_, value_;  // [n]
+  MatrixX<Scalar> d_logits_;        // [actions x n]
 };
 
 std::unique_ptr<Algorithm> MakeDiscreteBear(const AlgorithmSpec& spec);

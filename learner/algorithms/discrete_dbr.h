@@ -69,9 +69,9 @@ class DiscreteDbr : public ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>> {
   CategoricalLikelihood<Scalar> beta_plus_, beta_minus_;
   Categorical<Scalar> pi_, next_pi_;
   PolicyLossWorkspace<Scalar> workspace_;
-  VectorX<Scalar> target_, penalty_, log_prob_, bonus_, value_;
+  VectorX<Scalar> target_, penalty_, log_prob_, bonus_, value_;  // [n]
   SelfImitation<Scalar> imitation_;
-  MatrixX<Scalar> d_logits_;
+  MatrixX<Scalar> d_logits_;  // [actions x n]
 };
 
 std::unique_ptr<Algorithm> MakeDiscreteDbr(const AlgorithmSpec& spec);

@@ -1,4 +1,4 @@
-// The algorithms by name.
+// Makes algorithms by name. Thread-safe: pure functions.
 #pragma once
 
 #include <memory>

@@ -50,8 +50,8 @@ class Sac : public ActorCriticAlgorithm<SoftNetworks<Scalar>> {
   SampledActions<Scalar> next_draws_;
   SoftPolicyObjective<Scalar> objective_;
   CriticRegression<Scalar> regression_;
-  MatrixX<Scalar> noise_, d_output_;
-  VectorX<Scalar> next_value_, value_;
+  MatrixX<Scalar> noise_, d_output_;    // [dimensions x n], [2 * dimensions x n]
+  VectorX<Scalar> next_value_, value_;  // [n]
 };
 
 std::unique_ptr<Algorithm> MakeSac(const AlgorithmSpec& spec);

@@ -9,7 +9,7 @@
 namespace dbr {
 
 struct AdvantageWeighting {
-  double temperature = 1;   // lambda
+  double temperature = 1;   // lambda, above 0
   double max_weight = 100;  // above 0
 };
 

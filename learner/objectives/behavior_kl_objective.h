@@ -53,7 +53,7 @@ class BehaviorKlObjective {
  private:
   SampledActions<Scalar> draws_;
   QTerm<Scalar> q_term_;
-  VectorX<Scalar> kl_, d_log_prob_;
+  VectorX<Scalar> kl_, d_log_prob_;  // [n], [draws * n]
   GaussianGradient<Scalar> gradient_;
 };
 

@@ -31,9 +31,8 @@ void MeanOfSmaller(const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar
 template <class Scalar>
 struct QTerm {
   Scalar loss = 0;
-  Scalar value = 0;  // E[min_i mean_k Q_i(s, a_k)], not scaled
-  // [1 x count * n], as the critics' values.
-  MatrixX<Scalar> d_q1, d_q2;
+  Scalar value = 0;            // E[min_i mean_k Q_i(s, a_k)], not scaled
+  MatrixX<Scalar> d_q1, d_q2;  // [1 x count * n]
 };
 
 // loss = -E[min_i mean_k Q_i(s, a_k)] / scale. With `normalize`, scale is the mean over the batch of |min_i

@@ -34,8 +34,8 @@ class CriticRegression {
   const VectorX<Scalar>& behavior_value() const { return behavior_value_; }
 
  private:
-  VectorX<Scalar> target_, behavior_value_;
-  MatrixX<Scalar> inputs_;  // [observation + dimensions x n]
+  VectorX<Scalar> target_, behavior_value_;  // [n]
+  MatrixX<Scalar> inputs_;                   // [observation + dimensions x n]
 };
 
 }  // namespace dbr

@@ -66,9 +66,9 @@ class DeterministicPolicyObjective {
 
  private:
   SampledActions<Scalar> draws_;
-  VectorX<Scalar> d_log_prob_;
+  VectorX<Scalar> d_log_prob_;  // [n]
   GaussianGradient<Scalar> gradient_;
-  MatrixX<Scalar> noise_, d_q_;
+  MatrixX<Scalar> noise_, d_q_;  // [dimensions x n], [1 x n]
 };
 
 }  // namespace dbr

@@ -27,8 +27,8 @@ template <class Scalar>
 void GreedyValue(const ConstMatrixRef<Scalar>& chooser, const ConstMatrixRef<Scalar>& judge,
                  const ConstMatrixRef<Scalar>& masks, VectorX<Scalar>* value);
 
-// Sets `advantages` to A = min_i Q_i(s, a) - V(s) for each transition. value [n] is V(s). `advantages` gets
-// the size n.
+// Sets `advantages` to A = min_i Q_i(s, a) - V(s) for each transition. q1 and q2 are [actions x n], and value
+// [n] is V(s). `advantages` gets the size n.
 template <class Scalar>
 void ComputeAdvantages(const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar>& q2,
                        const ConstMatrixRef<Scalar>& actions, const VectorX<Scalar>& value,

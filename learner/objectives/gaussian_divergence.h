@@ -48,9 +48,9 @@ class GaussianDivergence {
   const GaussianGradient<Scalar>& gradient() const { return gradient_; }
 
  private:
-  VectorX<Scalar> value_;
+  VectorX<Scalar> value_;  // [n]
   GaussianGradient<Scalar> gradient_;
-  MatrixX<Scalar> pi_samples_, beta_samples_, d_samples_;
+  MatrixX<Scalar> pi_samples_, beta_samples_, d_samples_;  // [dimensions x n * samples]
 };
 
 }  // namespace dbr

@@ -62,9 +62,9 @@ class GaussianLikelihood {
 
   const LogStdLimits limits_;
   GaussianHead<Scalar> head_;
-  VectorX<Scalar> log_prob_;
+  VectorX<Scalar> log_prob_;  // [n]
   GaussianGradient<Scalar> gradient_;
-  MatrixX<Scalar> d_output_;
+  MatrixX<Scalar> d_output_;  // [2 * dimensions x n]
   Scalar loss_ = 0;
 };
 

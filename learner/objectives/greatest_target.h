@@ -31,7 +31,7 @@ class GreatestTarget {
  private:
   GaussianHead<Scalar> pi_;
   SampledActions<Scalar> draws_;
-  VectorX<Scalar> value_;
+  VectorX<Scalar> value_;  // [n]
 };
 
 }  // namespace dbr

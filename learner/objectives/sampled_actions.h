@@ -67,6 +67,7 @@ class SampledActions {
   }
 
   Eigen::Index n_ = 0, count_ = 0;
+  // noise_, mean_ and log_std_ [dimensions x count * n], input_ [observation + dimensions x count * n].
   MatrixX<Scalar> noise_, mean_, log_std_, input_;
   TanhSample<Scalar> sample_;
   GaussianGradient<Scalar> each_;

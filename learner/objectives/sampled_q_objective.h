@@ -47,7 +47,7 @@ class SampledQObjective {
  private:
   SampledActions<Scalar> draws_;
   QTerm<Scalar> q_term_;
-  VectorX<Scalar> d_log_prob_;
+  VectorX<Scalar> d_log_prob_;  // [count * n]
 };
 
 }  // namespace dbr

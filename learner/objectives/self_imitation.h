@@ -29,7 +29,7 @@ class SelfImitation {
   const VectorX<Scalar>& weights() const { return weights_; }  // [n]
 
  private:
-  VectorX<Scalar> advantage_, weights_;
+  VectorX<Scalar> advantage_, weights_;  // [n]
   bool imitates_ = false;
 };
 

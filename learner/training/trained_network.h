@@ -13,7 +13,7 @@
 
 namespace dbr {
 
-// Owns its parameters. It can be copied. One thread at a time.
+// Owns its parameters. It can be copied. One thread at a time. Inputs x are [input x n].
 template <class Scalar>
 class TrainedNetwork {
  public:
