@@ -63,9 +63,9 @@ class ContinuousBear : public ActorCriticAlgorithm<BearNetworks<Scalar>> {
   GreatestTarget<Scalar> next_;
   GaussianHead<Scalar> pi_;
   BearObjective<Scalar> objective_;
-  // Noise: vae_noise_ [latent x n], next_noise_ [dimensions x target_samples * n], action_noise_ [dimensions
-  // x policy_samples * n], divergence_noise_ [dimensions x n * divergence_samples], latent_noise_ [latent x n
-  // * divergence_samples]. d_output_ [2 * dimensions x n].
+  // Noise: vae_noise_ [latent x n], next_noise_ [dimensions x target_samples * n], action_noise_
+  // [dimensions x policy_samples * n], divergence_noise_ [dimensions x n * divergence_samples], latent_noise_
+  // [latent x n * divergence_samples]. d_output_ [2 * dimensions x n].
   MatrixX<Scalar> vae_noise_, next_noise_, action_noise_, divergence_noise_, latent_noise_, d_output_;
   VectorX<Scalar> value_;  // [n]
 };

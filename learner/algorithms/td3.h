@@ -49,8 +49,8 @@ class Td3 : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
   GaussianHead<Scalar> pi_, next_pi_;
   DeterministicPolicyObjective<Scalar> objective_;
   CriticRegression<Scalar> regression_;
-  // noise_ and next_actions_ [dimensions x n], next_inputs_ [observation + dimensions x n], d_output_ [2 *
-  // dimensions x n].
+  // noise_ and next_actions_ [dimensions x n], next_inputs_ [observation + dimensions x n], d_output_
+  // [2 * dimensions x n].
   MatrixX<Scalar> noise_, next_actions_, next_inputs_, d_output_;
   VectorX<Scalar> next_value_, value_;  // [n]
 };

@@ -10,8 +10,8 @@
 
 namespace dbr {
 
-// Returns the mean of (q - y)^2 over the n values. Sets `d_q` [1 x n] to its gradient with respect to q [1 x
-// n]. y [n] is a constant.
+// Returns the mean of (q - y)^2 over the n values. Sets `d_q` [1 x n] to its gradient with respect to q
+// [1 x n]. y [n] is a constant.
 template <class Scalar>
 Scalar SquaredError(const ConstMatrixRef<Scalar>& q, const VectorX<Scalar>& y, MatrixX<Scalar>* d_q);
 

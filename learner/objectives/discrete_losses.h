@@ -34,8 +34,8 @@ void ComputeAdvantages(const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Sc
                        const ConstMatrixRef<Scalar>& actions, const VectorX<Scalar>& value,
                        std::vector<float>* advantages);
 
-// Returns the mean of (Q(s, a) - y)^2 over the batch. Sets `d_q` to its gradient with respect to q [actions x
-// n]. y [n] is a constant.
+// Returns the mean of (Q(s, a) - y)^2 over the batch. Sets `d_q` to its gradient with respect to q
+// [actions x n]. y [n] is a constant.
 template <class Scalar>
 Scalar CriticLoss(const ConstMatrixRef<Scalar>& q, const ConstMatrixRef<Scalar>& actions,
                   const VectorX<Scalar>& y, MatrixX<Scalar>* d_q);
