@@ -39,8 +39,8 @@ class Exploration {
   Exploration(const ActionSpace& actions, const ExplorationOptions& options, int n);
 
   // Makes one step for each environment. It replaces columns of `actions` [width x n] by uniformly random
-  // legal ones, with each environment's share. A continuous action is replaced by one uniform in [-1,
-  // 1]^size. The others get normal noise and are clipped to [-1, 1]. masks [mask width x n]. Returns the
+  // legal ones, with each environment's share. A continuous action is replaced by one uniform in
+  // [-1, 1]^size. The others get normal noise and are clipped to [-1, 1]. masks [mask width x n]. Returns the
   // number of replaced actions.
   int Apply(const MatrixX<float>& masks, Rng& rng, MatrixX<float>* actions);
 

@@ -11,8 +11,8 @@
 
 namespace dbr {
 
-// Returns nested lists [n][dimensions] as [dimensions x n], or [n][samples][dimensions] as [dimensions x n *
-// samples].
+// Returns nested lists [n][dimensions] as [dimensions x n], or [n][samples][dimensions] as
+// [dimensions x n * samples].
 inline MatrixX<double> ToMatrix(const nlohmann::json& rows) {
   if (rows[0][0].is_array()) {
     nlohmann::json flat = nlohmann::json::array();
