@@ -41,7 +41,7 @@ class Actor {
 
   // Blocks until Stop(), and then returns OK, or until a final error of the policy, the environments or the
   // writer. In both cases it then blocks until everything that was written is acknowledged, or until
-  // drain_timeout has passed; it logs that with the counts.
+  // drain_timeout has passed, and logs the counts.
   absl::Status Run();
 
   void Stop();  // from any thread

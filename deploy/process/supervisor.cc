@@ -118,7 +118,7 @@ void Supervisor::Poll(absl::Time deadline) {
   [[maybe_unused]] const ssize_t n = read(wake_fd_, &wakes, sizeof wakes);
   signalfd_siginfo info;
   while (read(signal_fd_, &info, sizeof info) == sizeof info) {
-    // A terminal that closes asks for a stop. A second request from it is not impatience.
+    // A terminal that closes asks for a stop. Its SIGHUP after another signal is not a second request.
     const bool hangup_again = info.ssi_signo == SIGHUP && stop_signals_ > 0;
     if (info.ssi_signo != SIGCHLD && !hangup_again) ++stop_signals_;
   }

@@ -56,6 +56,8 @@ struct SupervisorOptions {
 // receives them from then on.
 class Supervisor {
  public:
+  // Returns Internal where the signals cannot be blocked, and the errors of Guard::Start and of making file
+  // descriptors.
   static absl::StatusOr<std::unique_ptr<Supervisor>> Create(SupervisorOptions options);
   ~Supervisor();  // calls Stop()
   Supervisor(const Supervisor&) = delete;
