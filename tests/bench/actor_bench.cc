@@ -1,5 +1,5 @@
-// Speed of acting: the agent's moves a second on one core, with everything that an actor does but the
-// network.
+// The speed of acting: the agent's moves a second on one core, with everything that an actor does except the
+// network transfer.
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,9 +17,9 @@ namespace dbr {
 namespace {
 
 constexpr int kGames = 256;
-constexpr int kBatchBytes = 32 << 10;  // of an insert message, as the config's default
+constexpr int kBatchBytes = 32 << 10;  // bytes of an insert message, as the config's default
 
-// A policy with twin critics of the paper's size, untrained.
+// An untrained policy with twin critics of the paper's size.
 std::shared_ptr<const PolicyNetworks> UntrainedPolicy(const EnvSpec& env) {
   PolicySnapshot snapshot;
   snapshot.version = 1;
@@ -41,9 +41,9 @@ double FlopsOfAMove(const EnvSpec& env) {
   return 3 * MlpShape(env.observation_size, {256, 256, 256}, env.actions.size).ForwardFlops(1);
 }
 
-// Items are the agent's moves against the random opponent: the policy's and both critics' forward passes, the
-// first advantage, the games, and the transitions encoded as an insert message holds them. `flops` counts the
-// products alone.
+// Items are the agent's moves against the random opponent: the forward passes of the policy and both critics,
+// the first advantage, the games, and the encoding of the transitions as an insert message holds them.
+// `flops` counts only the matrix products.
 void ActorMoves(benchmark::State& state, const std::string& env_name) {
   auto envs = VectorEnv::Create({.name = env_name, .opponents = {}}, kGames).value();
   const EnvSpec spec = envs->spec();

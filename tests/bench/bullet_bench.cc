@@ -1,5 +1,5 @@
-// Speed of the Bullet robots, resets and observations included, beside the bare simulation as its limit. Both
-// go through the same episodes of random actions.
+// The speed of the Bullet robots with resets and observations, and of the bare simulation as its limit. Both
+// run the same episodes of random actions.
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -16,7 +16,7 @@
 namespace dbr::bullet {
 namespace {
 
-// An episode of random actions: its seed is its number.
+// An episode of random actions. Its random seed is its number.
 class Actions {
  public:
   Actions(int width, std::uint64_t episode) : action_(width), rng_(episode) {}
@@ -30,8 +30,8 @@ class Actions {
   Rng rng_;
 };
 
-// The lengths of a robot's first episodes, up to some thousand steps in all. Episodes start again with the
-// first.
+// The lengths of a robot's first episodes, some thousand steps together. After the last one the first one
+// comes again.
 std::vector<int> EpisodeLengths(const std::string& name) {
   constexpr int kSteps = 4000;
   const auto env = MakeEnv({.name = name, .opponents = {}}).value();

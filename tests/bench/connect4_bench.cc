@@ -1,4 +1,4 @@
-// Speed of Connect-4: random games from the empty board to their end, and simulations of the tree search.
+// The speed of Connect-4: random games from the empty board to their end, and simulations of the tree search.
 #include <cstdint>
 
 #include "benchmark/benchmark.h"
@@ -12,7 +12,7 @@
 namespace dbr::connect4 {
 namespace {
 
-// Items are games, one at a time, through the function that the search calls.
+// Items are games, one at a time, played by the function that the search calls.
 void Connect4Playout(benchmark::State& state) {
   Rng rng(1);
   ChoiceStream choices(rng);
@@ -24,8 +24,8 @@ void Connect4Playout(benchmark::State& state) {
 }
 BENCHMARK(Connect4Playout);
 
-// Items are simulations, 100 a move, from a position so early that no such search proves it and stops before
-// its last one.
+// Items are simulations, 100 a move, from an early position. No such search proves it and stops before its
+// last simulation.
 void MctsSimulations(benchmark::State& state) {
   constexpr int kSimulations = 100;
   Rng rng(1);
@@ -36,7 +36,7 @@ void MctsSimulations(benchmark::State& state) {
 }
 BENCHMARK(MctsSimulations);
 
-// Items are steps of the environment, the reply of a random opponent and both observations included.
+// Items are steps of the environment, with the reply of a random opponent and both observations.
 void Connect4EnvStep(benchmark::State& state) {
   const auto env = MakeEnv({.name = "connect4", .opponents = {}}).value();
   float observation[kObservationSize];

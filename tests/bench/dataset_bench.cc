@@ -1,4 +1,5 @@
-// How fast offline data is read from HDF5 files into flat transitions, for a robot of the hopper's sizes.
+// The speed of reading offline data from HDF5 files into flat transitions, for a robot with the hopper's
+// sizes.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -20,7 +21,7 @@ constexpr int kActionWidth = 3;
 constexpr int kSteps = 1000;
 constexpr int kEpisodes = 200;
 
-// A file of smooth random walks, removed in the end.
+// A file of smooth random walks. It is removed at the end.
 class BenchFile {
  public:
   BenchFile(DatasetLayout layout, int compression)

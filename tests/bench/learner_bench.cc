@@ -1,5 +1,5 @@
-// Updates of the algorithms beside the matrix product that limits them; `flops` is useful operations a
-// second.
+// The speed of the algorithms' updates, and of the matrix product that limits them. `flops` is useful
+// operations a second.
 #include <benchmark/benchmark.h>
 
 #include "core/rng.h"
@@ -9,8 +9,8 @@
 namespace dbr {
 namespace {
 
-// Random boards with their legal actions for a discrete space, else random features and actions in the box;
-// rewards at a tenth of the transitions.
+// Fills a batch with random boards and their legal actions for a discrete space, else with random features
+// and actions in the box. A tenth of the transitions have rewards.
 void FillBatch(const AlgorithmSpec& spec, int n, Rng& rng, Batch* batch) {
   batch->Resize({spec.observation_size, spec.actions.width(), spec.actions.mask_width()}, n,
                 /*with_keys=*/false);
@@ -53,7 +53,7 @@ AlgorithmSpec Ant() {
   return SpecOf("ant", 28, {ActionKind::kContinuous, 8});
 }
 
-// The algorithm that `set` chooses, on one thread.
+// Makes the algorithm that `set` chooses, on one thread.
 template <class Set>
 AlgorithmSpec With(AlgorithmSpec spec, const Set& set) {
   set(spec.config);
@@ -64,7 +64,7 @@ AlgorithmSpec With(AlgorithmSpec spec, const Set& set) {
 void Dbr(AlgorithmConfig& config) {
   config.mutable_dbr()->set_divergence(DbrConfig::MMD_EXACT);
 }
-// Over discrete actions by KL, the default.
+// DBR over discrete actions with KL, the default.
 void DiscreteDbr(AlgorithmConfig& config) {
   config.mutable_dbr();
 }
@@ -128,7 +128,7 @@ DBR_UPDATE("brac/ant", With(Ant(), Brac));
 DBR_UPDATE("sac/ant", With(Ant(), Sac));
 DBR_UPDATE("td3/ant", With(Ant(), Td3));
 DBR_UPDATE("awac/ant", With(Ant(), Awac));
-// In wall-clock time; beside them the same on one thread.
+// These measure wall-clock time, on one thread and on two.
 DBR_UPDATE("sac/ant/one_thread", With(Ant(), Sac))->UseRealTime();
 DBR_UPDATE("dbr/ant/one_thread", With(Ant(), Dbr))->UseRealTime();
 DBR_UPDATE("sac/ant/two_threads", OnTwoThreads(With(Ant(), Sac)))->UseRealTime();

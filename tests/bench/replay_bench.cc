@@ -1,4 +1,5 @@
-// The replay: its buffer alone, and through gRPC on a unix socket. Rows have the shape of Connect-4's.
+// The speed of the replay: the buffer alone, and through gRPC on a unix socket. Rows have the shape of
+// Connect-4's.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -28,7 +29,7 @@ constexpr int kRowsInMessage = 44;  // 32 KiB
 constexpr int kBatch = 256;
 constexpr absl::Duration kTimeout = absl::Seconds(60);
 
-// `count` rows of zeros, ones and advantages of either sign.
+// `count` rows of zeros and ones, with advantages of both signs.
 struct Columns : ColumnSet<std::vector<float>> {
   explicit Columns(int count) : advantages(count), versions(count, 1), keys(count) {
     ForEachColumn(
@@ -127,7 +128,7 @@ void BufferRelabel(benchmark::State& state) {
 }
 BENCHMARK(BufferRelabel);
 
-// A server on a unix socket whose store lies in a file, with a client's side in this process.
+// A server on a unix socket with its store in a file, and a client in this process.
 class Served {
  public:
   Served() {
@@ -150,7 +151,7 @@ class Served {
     server.reset();
     std::filesystem::remove_all(folder_);
   }
-  // Blocks until all are acknowledged.
+  // Writes `count` transitions and blocks until all are acknowledged.
   void Write(int count) {
     for (int i = 0; i < count; ++i) {
       const int row = i % kRowsInMessage;
@@ -171,8 +172,7 @@ class Served {
   Columns message{kRowsInMessage};
 };
 
-// Transitions appended by one thread until they are acknowledged; the latency is the server's, of one
-// message.
+// Items are transitions that one thread appends and waits for. The latency is the server's, for one message.
 void ReplayInsert(benchmark::State& state) {
   constexpr int kWrites = 30000;
   Served served;
@@ -189,7 +189,7 @@ void ReplayInsert(benchmark::State& state) {
 }
 BENCHMARK(ReplayInsert)->UseRealTime()->Unit(benchmark::kMillisecond);
 
-// Batches of 256 drawn from D by one caller and decoded; the latency is the caller's.
+// Batches of 256 that one caller draws from D and decodes. The latency is the caller's.
 void ReplaySample(benchmark::State& state) {
   Served served;
   served.Write(kCapacity);
@@ -208,7 +208,7 @@ void ReplaySample(benchmark::State& state) {
 }
 BENCHMARK(ReplaySample)->UseRealTime()->Unit(benchmark::kMicrosecond);
 
-// A file of robot data as `dbr dataset record` writes it: hopper's sizes, episodes of 1,000 steps.
+// A file of robot data as `dbr dataset record` writes it: the hopper's sizes, episodes of 1,000 steps.
 class SeedBufferFile {
  public:
   static constexpr int kEpisodes = 200, kSteps = 1000;
@@ -243,7 +243,7 @@ class SeedBufferFile {
   std::string folder_ = (std::filesystem::temp_directory_path() / "dbr-XXXXXX").string();
 };
 
-// From the file into a store that lies in a file too, all in one thread.
+// Imports the file into a store in a file, on one thread.
 void SeedBufferImport(benchmark::State& state) {
   const SeedBufferFile file;
   for (auto _ : state) {
