@@ -3,6 +3,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "core/batch.h"
+#include "core/columns.h"
 #include "learner/training/policy_export.h"
 #include "learner/training/tensor_state.h"
 
