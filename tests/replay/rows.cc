@@ -6,7 +6,7 @@
 namespace dbr {
 
 TestFolder::TestFolder() {
-  // Short, for a socket's path has room for 107 characters only.
+  // The path is short, for a socket's path has room for 107 characters only.
   std::string name = (std::filesystem::temp_directory_path() / "dbr-XXXXXX").string();
   EXPECT_NE(mkdtemp(name.data()), nullptr) << name;
   path_ = name;

@@ -22,7 +22,7 @@ namespace {
 constexpr std::uint64_t kCapacity = 50;
 constexpr int kWriters = 3;
 
-// What the buffer promises, in the simplest words.
+// A model of what the buffer promises, as simple as it can be.
 struct Model {
   struct Row {
     std::uint64_t key;
@@ -101,7 +101,7 @@ class BufferAgainstModel : public ::testing::TestWithParam<std::tuple<int, bool>
     store_options_.resume = true;
   }
 
-  // Of few values, so that zeros, signs and equal ones all come up.
+  // Draws one of few values, so that zeros, signs and equal ones all come up.
   float RandomAdvantage() { return static_cast<float>(rng_.Below(5)) - 2; }
 
   void InsertSome() {

@@ -63,7 +63,7 @@ TEST_F(Buffer, AnInsertWaitsForDrawsAndGoesOnWhereItStopped) {
   EXPECT_EQ(buffer_->Stats().counters.duplicates, 0u);
 }
 
-// As when a connection breaks: the writer sends again on another one what the first still waits to store.
+// A broken connection does this: the writer sends again on another one what the first still waits to store.
 TEST_F(Buffer, TwoStreamsOfOneWriterThatWaitTogetherStoreEachRowOnce) {
   buffer_options_.limiter = {.samples_per_insert = 2, .tolerance = 20, .min_size = 10};
   Make();

@@ -97,7 +97,7 @@ TEST(RateLimiter, RefusesBoundsThatMakeNoSense) {
               AllOf(HasSubstr("replay.min_size"), HasSubstr("10 transitions"), HasSubstr("found 11")));
 }
 
-TEST(RateLimiter, IsIdleWhileThereIsNothingButSeed) {
+TEST(RateLimiter, IsIdleWhileThereIsNothingButTheSeedBuffer) {
   const RateLimiter limiter = Make(4, 40, 10);
   EXPECT_TRUE(limiter.CanDraw({.inserted = 0, .sampled = 0, .size = 100, .seed_buffer = 100}, 1000000));
   EXPECT_TRUE(limiter.CanInsert({.inserted = 0, .sampled = 0, .size = 100, .seed_buffer = 100}));
@@ -112,7 +112,7 @@ TEST(RateLimiter, CountsOnlineRowsFromTheFirstWhereTheSeedHasTheMinimum) {
   EXPECT_FALSE(limiter.CanDraw({.inserted = 1, .sampled = 0, .size = 101, .seed_buffer = 100}, 45));
   EXPECT_TRUE(limiter.CanInsert({.inserted = 10, .sampled = 0, .size = 110, .seed_buffer = 100}));   // 40
   EXPECT_FALSE(limiter.CanInsert({.inserted = 11, .sampled = 0, .size = 111, .seed_buffer = 100}));  // 44
-  // A seed of 6 leaves 4 of the minimum to the others.
+  // A seed buffer of 6 rows leaves 4 of the minimum to the others.
   EXPECT_TRUE(limiter.CanInsert({.inserted = 14, .sampled = 0, .size = 20, .seed_buffer = 6}));
   EXPECT_FALSE(limiter.CanInsert({.inserted = 15, .sampled = 0, .size = 21, .seed_buffer = 6}));
   EXPECT_THAT(limiter.WhyInsertWaits({.inserted = 15, .sampled = 0, .size = 21, .seed_buffer = 6}),

@@ -25,7 +25,7 @@ class OutboxTest : public ::testing::Test {
     reply.set_acknowledged_sequence(acknowledged);
     return reply;
   }
-  // What Next gives now until it gives nothing.
+  // All messages that Next gives now.
   std::vector<std::shared_ptr<const InsertRequest>> SendAll(bool waited_for = false) {
     std::vector<std::shared_ptr<const InsertRequest>> sent;
     while (auto message = outbox_.Next(now_, waited_for)) sent.push_back(message);

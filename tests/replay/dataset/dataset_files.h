@@ -32,10 +32,10 @@ struct TestEpisode {
   EpisodeView View() const { return {observations, actions, rewards, ending}; }
 };
 
-// Random numbers; shorter than kTestMaxEpisodeSteps where it ends by a terminal.
+// An episode of random numbers, shorter than kTestMaxEpisodeSteps where it ends by a terminal.
 TestEpisode MakeEpisode(std::uint64_t seed, int steps, EpisodeEnding ending);
 
-// Terminal ones of several lengths and some cut at kTestMaxEpisodeSteps, `steps` steps or a few more in all.
+// Episodes of several lengths, some of them cut at kTestMaxEpisodeSteps, `steps` steps or a few more in all.
 std::vector<TestEpisode> MakeEpisodes(std::uint64_t seed, int steps);
 
 // Writes arrays as other programs than ours do.
@@ -68,7 +68,8 @@ struct RawColumns {
   std::vector<float> observations, actions, rewards, terminals, timeouts, next_observations;
 };
 RawColumns D4rlColumns(const std::vector<TestEpisode>& episodes);
-// By the recipe: a time limit is a terminal, and no timeouts.
+// The columns as the recipe of d4rl_pybullet writes them: a time limit is a terminal, and there are no
+// timeouts.
 RawColumns PybulletColumns(const std::vector<TestEpisode>& episodes);
 
 // Keys in `left_out` are not written.
@@ -85,10 +86,10 @@ struct Reading {
 };
 absl::StatusOr<Reading> ReadAll(const std::string& path, const DatasetOptions& options, int chunk = 100);
 
-// The same, straight from the episodes.
+// The same, made from the episodes without a file.
 Reading Expected(const std::vector<TestEpisode>& episodes, float discount);
 
-// Equal rows, ends and facts, but for facts.rows.
+// Expects equal rows, ends and facts, but for facts.rows.
 void ExpectSame(const Reading& actual, const Reading& expected);
 
 }  // namespace dbr

@@ -47,7 +47,7 @@ class ReturnReaderTest : public ::testing::Test {
     }
   }
 
-  // Whether the returns are those of `rewards`, with nothing or with a stationary continuation behind them.
+  // Expects the returns of `rewards`, with nothing or with a stationary continuation behind them.
   static void ExpectReturns(const Stretch& stretch, const std::vector<float>& rewards, bool terminal) {
     ASSERT_EQ(stretch.rewards, rewards);
     const std::size_t last = std::min<std::size_t>(rewards.size(), kHorizon);

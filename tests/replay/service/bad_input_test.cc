@@ -47,7 +47,7 @@ class BadInput : public ::testing::Test {
     good_.set_acknowledge(true);
   }
 
-  // Sends both on a stream of their own; the stream's status, and the last acknowledgement.
+  // Sends both on a stream of their own. Gives the stream's status and the last acknowledgement.
   grpc::Status Send(const InsertRequest& opening, const InsertRequest& request,
                     InsertReply* reply = nullptr) {
     grpc::ClientContext context;

@@ -18,20 +18,21 @@ namespace {
 
 constexpr int kRows = 6;
 
-// With every column that there is, for a discrete space and for a continuous one.
+// Layouts with every column that a discrete space has, and a continuous one.
 constexpr TransitionLayout kDiscrete{
     .observation_width = 5, .action_width = 1, .mask_width = 3, .return_width = 1};
 constexpr TransitionLayout kContinuous{
     .observation_width = 5, .action_width = 2, .mask_width = 0, .return_width = 1};
 
-// Float k of a column in transition `row`: no two are alike, but that a discrete action must be one.
+// Float k of a column in transition `row`. No two are alike, except that a discrete action must be a legal
+// one.
 float Value(const TransitionLayout& layout, const ColumnPlace& place, int row, int k) {
   if (place.offset == layout.action_offset() && layout.mask_width > 0)
     return static_cast<float>(row % layout.mask_width);
   return static_cast<float>(1 + row * layout.stride() + place.offset + k);
 }
 
-// A message of kRows transitions, each value of which is Value's.
+// A message of kRows transitions with the floats of Value.
 InsertRequest Message(const TransitionLayout& layout) {
   InsertRequest message;
   message.set_first_sequence(1);

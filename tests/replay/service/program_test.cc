@@ -61,7 +61,7 @@ class ReplayProgram : public ::testing::Test {
     ASSERT_TRUE(channel->WaitForConnected(absl::ToChronoTime(absl::Now() + kPatience))) << Log();
   }
 
-  // The exit status; sends `signal` first unless 0.
+  // Waits for the exit status; sends `signal` first unless it is 0.
   int End(int signal) {
     if (signal != 0) kill(pid_, signal);
     int status = 0;

@@ -52,7 +52,7 @@ class SeedBufferImportTest : public ::testing::Test {
     server_ = std::move(*server);
     options_.store.resume = true;
   }
-  // Why the server does not start; that leaves no store behind.
+  // The error with which the server does not start; a failed start leaves no store behind.
   absl::Status StartError() {
     const absl::Status status = ReplayServer::Start(options_).status();
     EXPECT_NE(access(options_.store.path.c_str(), F_OK), 0);
