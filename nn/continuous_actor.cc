@@ -65,7 +65,7 @@ const MatrixX<float>& ContinuousActor::Critic(const PolicyNetworks& policy, cons
 
 void ContinuousActor::ChooseGreedy(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
                                    Rng& rng, Eigen::Ref<MatrixX<float>> actions) {
-  Sample(PolicyRunner::kGreedySamples, rng);
+  Sample(kGreedySamples, rng);
   const MatrixX<float>& q = Critic(policy, kCritic1, observations, actions_);
   const Eigen::Index n = observations.cols();
   for (Eigen::Index j = 0; j < n; ++j) {
@@ -85,12 +85,12 @@ void ContinuousActor::EvaluateSmaller(const PolicyNetworks& policy, const ConstM
 
 void ContinuousActor::MeanValue(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
                                 Rng& rng, Eigen::Ref<VectorX<float>> values) {
-  Sample(PolicyRunner::kValueSamples, rng);
+  Sample(kValueSamples, rng);
   EvaluateSmaller(policy, observations, actions_);
   const Eigen::Index n = observations.cols();
   values.setZero();
-  for (Eigen::Index k = 0; k < PolicyRunner::kValueSamples; ++k) values += values_.segment(k * n, n);
-  values /= static_cast<float>(PolicyRunner::kValueSamples);
+  for (Eigen::Index k = 0; k < kValueSamples; ++k) values += values_.segment(k * n, n);
+  values /= static_cast<float>(kValueSamples);
 }
 
 void ContinuousActor::Advantages(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,

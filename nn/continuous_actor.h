@@ -1,18 +1,22 @@
-// Acting over continuous actions; the part of PolicyRunner behind it.
+// Acting over continuous actions: PolicyRunner's part for them (nn/policy.h).
 #pragma once
 
-#include <memory>
-
 #include "absl/status/status.h"
+#include "core/batch.h"
 #include "core/rng.h"
 #include "nn/gaussian_head.h"
-#include "nn/policy.h"
-#include "nn/tanh_gaussian.h"
+#include "nn/mlp.h"
+#include "nn/policy_networks.h"
+#include "proto/config.pb.h"
 
 namespace dbr {
 
-// Workspaces for one thread. The functions are those of PolicyRunner, for observations that are normalised
-// already.
+// How many actions are drawn for each state.
+inline constexpr int kGreedySamples = 10;  // of which the mode GREEDY_Q takes the best
+inline constexpr int kValueSamples = 5;    // whose mean Q is V
+
+// Holds workspaces for one thread. The functions are those of PolicyRunner, for observations that are
+// normalised already.
 class ContinuousActor {
  public:
   absl::Status Act(const PolicyNetworks& policy, ActingMode mode, const ConstMatrixRef<float>& observations,
@@ -28,7 +32,7 @@ class ContinuousActor {
   // The smaller twin at the observations, repeated as Critic's, and `actions`, into values_ [columns].
   void EvaluateSmaller(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
                        const ConstMatrixRef<float>& actions);
-  // V(s) [n] of the observations that head_ is of.
+  // V(s) [n] at the observations that Evaluate was last called with.
   void MeanValue(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations, Rng& rng,
                  Eigen::Ref<VectorX<float>> values);
   // Draws `count` actions of each state: draw k of state j is column k * n + j of actions_.

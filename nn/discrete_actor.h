@@ -1,15 +1,19 @@
-// Acting over discrete actions; the part of PolicyRunner behind it.
+// Acting over discrete actions: PolicyRunner's part for them (nn/policy.h).
 #pragma once
 
 #include "absl/status/status.h"
+#include "core/batch.h"
 #include "core/rng.h"
 #include "nn/categorical.h"
-#include "nn/policy.h"
+#include "nn/mlp.h"
+#include "nn/policy_networks.h"
+#include "nn/policy_view.h"
+#include "proto/config.pb.h"
 
 namespace dbr {
 
-// Workspaces for one thread. The functions are those of PolicyRunner, for observations that are normalised
-// already.
+// Holds workspaces for one thread. The functions are those of PolicyRunner, for observations that are
+// normalised already.
 class DiscreteActor {
  public:
   absl::Status Act(const PolicyNetworks& policy, ActingMode mode, const ConstMatrixRef<float>& observations,
@@ -21,11 +25,14 @@ class DiscreteActor {
                          const ConstMatrixRef<float>& masks);
 
  private:
+  // The output [actions x n] of one network, valid until the next call.
   const MatrixX<float>& Run(const PolicyNetworks& policy, const char* name,
                             const ConstMatrixRef<float>& observations);
+  // The probabilities [actions x n] of one network over the legal actions.
   void RunCategorical(const PolicyNetworks& policy, const char* name,
                       const ConstMatrixRef<float>& observations, const ConstMatrixRef<float>& masks,
                       MatrixX<float>* probabilities);
+  // The smaller twin into view_.q, and both behaviours of DBR into view_; empty where the policy lacks them.
   void RunCritics(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations);
   void RunDualBehavior(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
                        const ConstMatrixRef<float>& masks);
