@@ -29,6 +29,7 @@ class HealthCheck {
   std::optional<absl::Status> result() const;
 
  private:
+  // Blocks until the answer, the deadline or the cancellation.
   absl::Status Ask(const std::string& address);
 
   grpc::ClientContext context_;

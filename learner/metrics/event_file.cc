@@ -6,45 +6,16 @@
 
 #include "absl/strings/str_format.h"
 #include "core/crc32c.h"
+#include "proto/tensorboard_event.pb.h"
 
 namespace dbr {
 namespace {
-
-// Field numbers of tensorboard's Event, Summary and Summary.Value messages.
-constexpr int kEventWallTime = 1;
-constexpr int kEventStep = 2;
-constexpr int kEventFileVersion = 3;
-constexpr int kEventSummary = 5;
-constexpr int kSummaryValue = 1;
-constexpr int kValueTag = 1;
-constexpr int kValueSimple = 2;
-
-// Wire types of Protobuf.
-constexpr int kVarint = 0;
-constexpr int kFixed64 = 1;
-constexpr int kBytes = 2;
-constexpr int kFixed32 = 5;
 
 template <class T>
 void AppendFixed(T value, std::string* out) {
   char bytes[sizeof value];
   std::memcpy(bytes, &value, sizeof value);
   out->append(bytes, sizeof value);
-}
-
-void AppendVarint(std::uint64_t value, std::string* out) {
-  for (; value >= 0x80; value >>= 7) out->push_back(static_cast<char>(value | 0x80));
-  out->push_back(static_cast<char>(value));
-}
-
-void AppendKey(int field, int wire_type, std::string* out) {
-  AppendVarint(static_cast<std::uint64_t>(field << 3 | wire_type), out);
-}
-
-void AppendBytes(int field, absl::string_view bytes, std::string* out) {
-  AppendKey(field, kBytes, out);
-  AppendVarint(bytes.size(), out);
-  out->append(bytes.data(), bytes.size());
 }
 
 // A checksum stored beside data that may itself hold checksums is rotated and offset, as the TFRecord format
@@ -54,10 +25,9 @@ std::uint32_t MaskedCrc(const void* data, std::size_t size) {
   return ((crc >> 15) | (crc << 17)) + 0xa282ead8u;
 }
 
-std::string EventAt(double wall_time) {
-  std::string event;
-  AppendKey(kEventWallTime, kFixed64, &event);
-  AppendFixed(wall_time, &event);
+tensorboard::Event EventAt(double wall_time) {
+  tensorboard::Event event;
+  event.set_wall_time(wall_time);
   return event;
 }
 
@@ -73,25 +43,21 @@ std::string FrameRecord(absl::string_view payload) {
 }
 
 std::string VersionRecord(double wall_time) {
-  std::string event = EventAt(wall_time);
-  AppendBytes(kEventFileVersion, "brain.Event:2", &event);
-  return FrameRecord(event);
+  tensorboard::Event event = EventAt(wall_time);
+  event.set_file_version("brain.Event:2");
+  return FrameRecord(event.SerializeAsString());
 }
 
 std::string ScalarRecord(std::int64_t step, double wall_time, const Scalars& scalars) {
-  std::string summary;
+  tensorboard::Event event = EventAt(wall_time);
+  event.set_step(step);
+  tensorboard::Summary* summary = event.mutable_summary();
   for (const auto& [tag, value] : scalars) {
-    std::string entry;
-    AppendBytes(kValueTag, tag, &entry);
-    AppendKey(kValueSimple, kFixed32, &entry);
-    AppendFixed(static_cast<float>(value), &entry);
-    AppendBytes(kSummaryValue, entry, &summary);
+    tensorboard::Summary::Value* entry = summary->add_value();
+    entry->set_tag(tag);
+    entry->set_simple_value(static_cast<float>(value));
   }
-  std::string event = EventAt(wall_time);
-  AppendKey(kEventStep, kVarint, &event);
-  AppendVarint(static_cast<std::uint64_t>(step), &event);
-  AppendBytes(kEventSummary, summary, &event);
-  return FrameRecord(event);
+  return FrameRecord(event.SerializeAsString());
 }
 
 std::string EventFileName(double wall_time) {

@@ -1,4 +1,4 @@
-// TensorBoard's event records: TFRecord framing around the Event message of its event.proto.
+// TensorBoard's event records: TFRecord framing around the messages of proto/tensorboard_event.proto.
 #pragma once
 
 #include <cstdint>
@@ -10,16 +10,17 @@
 
 namespace dbr {
 
-// Tag and value of one scalar.
+// Scalars that belong to one moment, each with its tag. TensorBoard shows a value with the precision of a
+// float.
 using Scalars = std::vector<std::pair<std::string, double>>;
 
 // One record: length (8 bytes), masked CRC-32C of the length (4), `payload`, masked CRC-32C of the payload
 // (4); little-endian.
 std::string FrameRecord(absl::string_view payload);
 
-// The record that opens every event file, and the one for a row of scalars. `wall_time` is in seconds since
-// 1970.
+// The record that opens every event file. `wall_time` is in seconds since 1970.
 std::string VersionRecord(double wall_time);
+// The record of a row of scalars at `step`, which counts whatever the run counts by (updates, transitions).
 std::string ScalarRecord(std::int64_t step, double wall_time, const Scalars& scalars);
 
 // "events.out.tfevents.SECONDS.HOST.PID": TensorBoard reads the files of a folder in the order of their

@@ -158,6 +158,25 @@ TEST_F(MetricsSinkTest, WritesEachRowToBothFiles) {
   EXPECT_EQ(events[2].step, 1000u);
 }
 
+// The framing and the fields byte by byte, so that a change of the schema or of the library is seen.
+TEST(EventFileTest, ARecordIsTheBytesThatTensorBoardExpects) {
+  const std::string event(
+      "\x09\x00\x00\x00\x00\x00\x00\xf8\x3f"  // 1, fixed64: wall_time 1.5
+      "\x10\xac\x02"                          // 2, varint: step 300
+      "\x2a\x14"                              // 5, 20 bytes: summary
+      "\x0a\x08\x0a\x01"                      // 1, 8 bytes: a value; its 1, one byte: tag
+      "a\x15\x00\x00\x80\x3f"                 // 2, fixed32: simple_value 1
+      "\x0a\x08\x0a\x01"                      // as before
+      "b\x15\x00\x00\x00\x00",                // simple_value 0, which is written too
+      9 + 3 + 2 + 4 + 6 + 4 + 6);
+  const std::string record = ScalarRecord(300, 1.5, {{"a", 1}, {"b", 0}});
+  ASSERT_EQ(record.size(), 16 + event.size());
+  EXPECT_EQ(ReadFixed<std::uint64_t>(record, 0), event.size());
+  EXPECT_EQ(ReadFixed<std::uint32_t>(record, 8), MaskedCrc(record.substr(0, 8)));
+  EXPECT_EQ(record.substr(12, event.size()), event);
+  EXPECT_EQ(ReadFixed<std::uint32_t>(record, 12 + event.size()), MaskedCrc(event));
+}
+
 TEST_F(MetricsSinkTest, WhatIsNotFiniteIsNull) {
   const auto sink = Open();
   ASSERT_TRUE(sink->Write(1, kStart,

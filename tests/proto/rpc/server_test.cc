@@ -12,6 +12,7 @@
 #include <memory>
 
 #include "core/file_io.h"
+#include "proto/health.grpc.pb.h"
 #include "proto/replay.grpc.pb.h"
 #include "proto/rpc/channel.h"
 #include "tests/support/temp_dir.h"
@@ -35,9 +36,7 @@ std::string ToString(const grpc::ByteBuffer& buffer) {
              : "";
 }
 
-// Sends one message to a method by its name. Returns the first answer's bytes, or "" where the call failed.
-// The messages of the standard services are written by hand below, because their generated classes are not
-// packaged.
+// Sends one message to a method by its name and gives the first answer's bytes; "" where the call failed.
 std::string CallByName(const std::string& address, const std::string& method, const std::string& request) {
   grpc::GenericStub stub(MakeChannel(address));
   grpc::ClientContext context;
@@ -64,9 +63,15 @@ std::string CallByName(const std::string& address, const std::string& method, co
   return good ? ToString(response) : "";
 }
 
-// A HealthCheckResponse with status (field 1) SERVING (1).
 bool IsServing(const std::string& address) {
-  return CallByName(address, "/grpc.health.v1.Health/Check", "") == std::string("\x08\x01");
+  using grpc::health::v1::HealthCheckResponse;
+  grpc::ClientContext context;
+  SetDeadline(kTimeout, &context);
+  context.set_wait_for_ready(true);
+  HealthCheckResponse response;
+  const grpc::Status status =
+      grpc::health::v1::Health::NewStub(MakeChannel(address))->Check(&context, {}, &response);
+  return status.ok() && response.status() == HealthCheckResponse::SERVING;
 }
 
 class ServerTest : public testing::Test {
@@ -97,7 +102,7 @@ TEST_F(ServerTest, PicksAPortAndSaysWhich) {
 TEST_F(ServerTest, ReflectionNamesTheServices) {
   const auto running = Start(socket_address());
   ASSERT_TRUE(running.ok()) << running.status();
-  // A ServerReflectionRequest with list_services (field 7) "*".
+  // A ServerReflectionRequest with list_services (field 7) "*", written by hand: no package has its class.
   const std::string services = CallByName(
       running->address, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo", "\x3a\x01*");
   EXPECT_THAT(services, HasSubstr("dbr.Replay"));
