@@ -8,6 +8,7 @@
 
 #include "core/status_macros.h"
 #include "envs/registry/registry.h"
+#include "proto/rpc/grpc_status.h"
 
 namespace dbr {
 namespace {
@@ -38,10 +39,6 @@ void Log(const EvaluationResult& result, const PolicySnapshot& snapshot) {
                  snapshot.version, snapshot.updates, result.return_mean, result.return_stderr,
                  result.length_mean);
   }
-}
-
-bool IsTransient(const absl::Status& status) {
-  return absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status) || absl::IsCancelled(status);
 }
 
 }  // namespace
@@ -166,7 +163,7 @@ void EvaluationLoop::KeepIfBest(double mean, const PolicySnapshot& snapshot) {
 void EvaluationLoop::SendReports() {
   while (!unsent_.empty() && !closing_) {
     const absl::Status status = ports_.report(unsent_.front());
-    if (IsTransient(status)) {
+    if (!status.ok() && !IsFinal(status)) {
       if (std::exchange(said_loss_, true)) return;
       spdlog::warn("no learner to take an evaluation: {}. Keeping it until there is one",
                    std::string(status.message()));

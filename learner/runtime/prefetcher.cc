@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "proto/rpc/grpc_status.h"
+
 namespace dbr {
 
 Prefetcher::Prefetcher(ReplayClient* client, const PrefetcherOptions& options)
@@ -63,7 +65,7 @@ void Prefetcher::Run() {
       if (!HandleFailure(status, &away)) break;
       continue;
     }
-    if (std::exchange(away, false)) spdlog::info("the replay server is back");
+    if (std::exchange(away, false)) spdlog::info("the replay server gives batches again");
     if (!ready_.Push(std::move(batches))) break;
   }
   ready_.Close();
@@ -72,21 +74,16 @@ void Prefetcher::Run() {
 bool Prefetcher::HandleFailure(const absl::Status& status, bool* away) {
   absl::MutexLock lock(&mutex_);
   if (closed_) return false;
-  switch (status.code()) {
-    case absl::StatusCode::kDeadlineExceeded:  // the rate limiter holds the draw
-      return true;
-    case absl::StatusCode::kUnavailable:
-    case absl::StatusCode::kCancelled:
-    case absl::StatusCode::kUnknown:
-      if (!std::exchange(*away, true)) {
-        spdlog::warn("the replay server is away, trying again: {}", std::string(status.message()));
-      }
-      mutex_.AwaitWithTimeout(absl::Condition(this, &Prefetcher::Closed), options_.retry_after);
-      return !closed_;
-    default:
-      final_ = status;
-      return false;
+  if (IsFinal(status)) {
+    final_ = status;
+    return false;
   }
+  if (absl::IsDeadlineExceeded(status)) return true;  // the rate limiter holds the draw
+  if (!std::exchange(*away, true)) {
+    spdlog::warn("the replay server gives no batches, trying again: {}", std::string(status.message()));
+  }
+  mutex_.AwaitWithTimeout(absl::Condition(this, &Prefetcher::Closed), options_.retry_after);
+  return !closed_;
 }
 
 }  // namespace dbr

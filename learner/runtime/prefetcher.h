@@ -17,13 +17,14 @@ namespace dbr {
 struct PrefetcherOptions {
   DrawCounts counts;
   TransitionLayout layout;
-  int depth = 2;                                   // batches ready ahead
-  absl::Duration call_timeout = absl::Seconds(5);  // of one Sample call; a call held that long is made again
+  int depth = 2;                                         // batches ready ahead
+  absl::Duration call_timeout = absl::Seconds(5);        // a Sample call that is held so long is made again
   absl::Duration retry_after = absl::Milliseconds(500);  // after a loss of the server
 };
 
-// Draws in a thread of its own until closed. A server that goes away, and its return, are said once each;
-// batches that the rate limiter holds back are waited for. A refusal (widths that differ) is final.
+// Draws in a thread of its own until closed. A server that goes away, and its return, are logged once each;
+// batches that the rate limiter holds back are waited for. An error that no other try mends (IsFinal,
+// proto/rpc/grpc_status.h: widths that differ, for example) ends the drawing. Thread-safe.
 class Prefetcher {
  public:
   // `client` outlives the prefetcher.
@@ -34,7 +35,7 @@ class Prefetcher {
   absl::StatusOr<std::unique_ptr<DrawnBatches>> Next();
   // Gives a batch back, so that its memory is used again.
   void Recycle(std::unique_ptr<DrawnBatches> batches);
-  // Share of Next() calls that had to wait.
+  // The share of Next() calls so far that had to wait, in [0, 1].
   double starved_share() const;
 
   void Close();  // from any thread; wakes Next

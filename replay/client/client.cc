@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/clock.h"
 #include "core/status_macros.h"
@@ -27,8 +28,11 @@ constexpr absl::Duration kConnectTime = absl::Milliseconds(200);
 
 absl::Status DecodePart(const SampledPart& part, const TransitionLayout& layout, Batch* out) {
   RETURN_IF_ERROR(Decode(part.transitions(), layout, out));
-  if (part.keys_size() != out->size())
-    return absl::InternalError("the replay server sent a batch without its keys");
+  if (part.keys_size() != out->size()) {
+    return absl::InvalidArgumentError(absl::StrCat("keys: expected ", out->size(),
+                                                   ", one for each transition of the batch, found ",
+                                                   part.keys_size(), " from the replay server"));
+  }
   out->keys.assign(part.keys().begin(), part.keys().end());
   return absl::OkStatus();
 }
