@@ -14,6 +14,7 @@
 #include "proto/rpc/channel.h"
 #include "proto/rpc/codec.h"
 #include "proto/rpc/grpc_status.h"
+#include "proto/rpc/protocol.h"
 
 namespace dbr {
 namespace {
@@ -101,6 +102,7 @@ absl::Status PolicySubscriber::Subscribe() {
   SetDeadline(kStreamLifetime, &context);
   SubscribeRequest request;
   request.set_subscriber(options_.name);
+  request.set_protocol_version(kProtocolVersion);
   {
     absl::MutexLock lock(&mutex_);
     if (closed_) return absl::CancelledError("closed");
@@ -129,6 +131,8 @@ absl::Status PolicySubscriber::Subscribe() {
 }
 
 absl::Status PolicySubscriber::Take(const PolicyMessage& message) {
+  RETURN_IF_ERROR(CheckProtocolVersion(message.protocol_version(), "the learner",
+                                       absl::StrCat("the subscriber ", options_.name)));
   ASSIGN_OR_RETURN(PolicySnapshot snapshot, Decode(message));
   RETURN_IF_ERROR(CheckSameSpec(options_.expected, snapshot.spec));
   ASSIGN_OR_RETURN(PolicyPtr policy, PolicyNetworks::Create(std::move(snapshot)));

@@ -22,10 +22,10 @@ class ClientContext;
 namespace dbr {
 
 struct SubscriberOptions {
-  std::string address;     // of the learner's policy service
+  std::string address;     // the learner's: "unix:/path" or "host:port"
   std::string name;        // for people: "actor-0"
   PolicySpec expected;     // algorithm empty: any
-  std::uint64_t seed = 1;  // of the jitter between attempts
+  std::uint64_t seed = 1;  // for the jitter between attempts
   absl::Duration first_backoff = absl::Milliseconds(100);
   absl::Duration max_backoff = absl::Seconds(2);
 };
@@ -33,11 +33,12 @@ struct SubscriberOptions {
 // What a config asks of a policy for an environment: its networks' sizes; any algorithm.
 PolicySpec ExpectedPolicy(const EnvSpec& env, const Config& config);
 
-// Subscribes in a thread of its own until closed. A learner that goes away or sends a damaged policy is said
-// once and tried again, at growing intervals with jitter; its return is said once; meanwhile the last policy
-// stays current. A policy for another environment or other network sizes, and a server that is no learner,
-// are final errors. Whatever version the learner offers is taken, also a lower one (a learner that started
-// anew). Thread-safe.
+// Subscribes in a thread of its own until closed. A learner that goes away or sends a damaged policy is
+// logged once and tried again, at growing intervals with jitter; its return is logged once; meanwhile the
+// last policy stays current. A policy for another environment or other network sizes, a learner that speaks
+// another protocol version, and a server that is no learner are final errors (IsFinal,
+// proto/rpc/grpc_status.h). Whatever version the learner offers is taken, also a lower one (a learner that
+// started anew). Thread-safe.
 class PolicySubscriber {
  public:
   using PolicyPtr = std::shared_ptr<const PolicyNetworks>;
@@ -68,15 +69,16 @@ class PolicySubscriber {
 
   const SubscriberOptions options_;
   const std::unique_ptr<Stub> stub_;
-  Rng rng_;            // of the thread
-  bool said_ = false;  // of the thread: the loss is known to the reader of the log
-  int attempts_ = 0;   // of the thread: since the last policy
+  // The subscriber's thread alone uses these three.
+  Rng rng_;
+  bool said_ = false;  // the log has the loss of the learner
+  int attempts_ = 0;   // to open a stream, since the last policy
 
   mutable absl::Mutex mutex_;
   PolicyPtr current_ ABSL_GUARDED_BY(mutex_);
   absl::Status final_ ABSL_GUARDED_BY(mutex_);
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
-  grpc::ClientContext* context_ ABSL_GUARDED_BY(mutex_) = nullptr;  // of the stream under way
+  grpc::ClientContext* context_ ABSL_GUARDED_BY(mutex_) = nullptr;  // that of the stream under way, not owned
   std::thread thread_;
 };
 

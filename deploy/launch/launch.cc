@@ -197,6 +197,7 @@ absl::Status Launch::Train() {
   while (supervisor_->stop_signals() == 0) {
     const absl::Time now = absl::Now();
     const RunSample sample = monitor_->Latest();
+    RETURN_IF_ERROR(sample.refusal);
     Observe(sample, now);
     if (summary().ended != RunEnding::kRunning) return absl::OkStatus();
     if (!acting_ && watch_.limits().OfflinePhaseIsOver(sample)) {

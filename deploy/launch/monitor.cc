@@ -1,17 +1,29 @@
 #include "deploy/launch/monitor.h"
 
+#include <string>
 #include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "proto/rpc/grpc_status.h"
 
 namespace dbr {
 namespace {
 
 constexpr absl::Duration kCallTimeout = absl::Seconds(2);
 
+// Takes note of an error that is final; the first one stays.
+void NoteRefusal(const std::string& address, const absl::Status& status, absl::Status* refusal) {
+  if (!IsFinal(status)) return;
+  refusal->Update(absl::Status(status.code(), absl::StrCat(address, ": ", status.message())));
+}
+
 }  // namespace
 
 RunMonitor::RunMonitor(const std::string& replay_address, const std::string& learner_address,
                        absl::Duration period, std::function<void()> on_sample)
-    : replay_(replay_address),
+    : replay_address_(replay_address),
+      learner_address_(learner_address),
+      replay_(replay_address),
       learner_(learner_address),
       period_(period),
       on_sample_(std::move(on_sample)),
@@ -35,6 +47,8 @@ RunSample RunMonitor::Ask(absl::Duration timeout) {
   const absl::StatusOr<StatsReply> stats = replay_.Stats(timeout);
   const absl::StatusOr<LearnerStatus> status = learner_.Status(timeout);
   absl::MutexLock lock(&mutex_);
+  NoteRefusal(replay_address_, stats.status(), &latest_.refusal);
+  NoteRefusal(learner_address_, status.status(), &latest_.refusal);
   latest_.replay_away = !stats.ok();
   if (stats.ok()) latest_.replay = *stats;
   latest_.learner_away = !status.ok();
@@ -44,8 +58,9 @@ RunSample RunMonitor::Ask(absl::Duration timeout) {
 
 void RunMonitor::Run() {
   for (;;) {
-    Ask(kCallTimeout);
+    const bool refused = !Ask(kCallTimeout).refusal.ok();
     on_sample_();
+    if (refused) return;
     absl::MutexLock lock(&mutex_);
     if (mutex_.AwaitWithTimeout(absl::Condition(&stopping_), period_)) return;
   }

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "absl/base/thread_annotations.h"
+#include "absl/status/status.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
 #include "proto/policy.pb.h"
@@ -16,15 +17,18 @@
 
 namespace dbr {
 
-// The newest answers of both services; they stay while a service is away.
+// The newest answers of the services; an answer stays while its service is away.
 struct RunSample {
   std::optional<StatsReply> replay;
   std::optional<LearnerStatus> learner;
   bool replay_away = false;
   bool learner_away = false;
+  // OK, or the error of a service for which no other question will be answered (IsFinal,
+  // proto/rpc/grpc_status.h): it speaks another protocol version, for example.
+  absl::Status refusal;
 };
 
-// Asks both services every `period` in a thread of its own. Thread-safe.
+// Asks both services every `period` in a thread of its own, until there is a refusal. Thread-safe.
 class RunMonitor {
  public:
   // `on_sample` is called from the monitor's thread after each round; it must not block.
@@ -42,6 +46,8 @@ class RunMonitor {
  private:
   void Run();
 
+  const std::string replay_address_;
+  const std::string learner_address_;
   ReplayClient replay_;
   LearnerClient learner_;
   const absl::Duration period_;

@@ -5,8 +5,11 @@
 #include <utility>
 
 #include "absl/cleanup/cleanup.h"
+#include "absl/strings/str_cat.h"
 #include "absl/time/time.h"
 #include "proto/rpc/codec.h"
+#include "proto/rpc/grpc_status.h"
+#include "proto/rpc/protocol.h"
 
 namespace dbr {
 namespace {
@@ -18,7 +21,8 @@ PolicyService::PolicyService(std::function<void(const EvaluationReport&)> on_eva
     : on_evaluation_(std::move(on_evaluation)) {}
 
 void PolicyService::Publish(const PolicySnapshot& snapshot) {
-  auto message = std::make_shared<const PolicyMessage>(Encode(snapshot));
+  auto message = std::make_shared<PolicyMessage>(Encode(snapshot));
+  message->set_protocol_version(kProtocolVersion);
   absl::MutexLock lock(&mutex_);
   newest_ = std::move(message);
 }
@@ -44,6 +48,9 @@ std::shared_ptr<const PolicyMessage> PolicyService::WaitForOther(std::uint64_t h
 
 grpc::Status PolicyService::Subscribe(grpc::ServerContext* context, const SubscribeRequest* request,
                                       grpc::ServerWriter<PolicyMessage>* writer) {
+  const absl::Status version = CheckProtocolVersion(
+      request->protocol_version(), absl::StrCat("the subscriber ", request->subscriber()), "the learner");
+  if (!version.ok()) return ToGrpc(version);
   std::uint64_t have = request->have_version(), subscription = 0;
   {
     absl::MutexLock lock(&mutex_);
@@ -71,6 +78,7 @@ grpc::Status PolicyService::Subscribe(grpc::ServerContext* context, const Subscr
 grpc::Status PolicyService::Status(grpc::ServerContext*, const LearnerStatusRequest*, LearnerStatus* reply) {
   absl::MutexLock lock(&mutex_);
   *reply = status_;
+  reply->set_protocol_version(kProtocolVersion);
   for (const auto& [opponent, report] : evaluations_) *reply->add_evaluations() = report;
   reply->mutable_skipped_iterations()->Assign(skipped_iterations_.begin(), skipped_iterations_.end());
   reply->set_subscribers(static_cast<std::uint32_t>(sent_versions_.size()));

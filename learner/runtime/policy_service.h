@@ -1,4 +1,5 @@
-// The learner's face to the other processes: the newest policy, the state of training, evaluators' reports.
+// What the learner serves to the other processes: the newest policy, the state of training, and a place for
+// the evaluators' reports.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,8 @@
 
 namespace dbr {
 
-// Thread-safe. Holds one snapshot, the newest: a subscriber that is slow skips versions.
+// Holds one snapshot, the newest: a subscriber that is slow skips versions. A subscriber that speaks another
+// protocol version is refused with FAILED_PRECONDITION (proto/rpc/protocol.h). Thread-safe.
 class PolicyService final : public Policy::Service {
  public:
   // `on_evaluation` is called from a server thread for each report; it must not block for long.
@@ -23,9 +25,10 @@ class PolicyService final : public Policy::Service {
 
   // Offers a snapshot to all subscribers; its version grows from call to call.
   void Publish(const PolicySnapshot& snapshot);
-  // What Status answers, but for subscribers and what evaluators report, which the service knows itself.
+  // Sets what Status answers, but for the subscribers, the evaluators' reports and the protocol version,
+  // which the service knows itself.
   void SetStatus(LearnerStatus status);
-  // Ends all subscriptions; before the server's Shutdown.
+  // Ends all subscriptions with UNAVAILABLE; belongs before the server's Shutdown.
   void Close();
 
   grpc::Status Subscribe(grpc::ServerContext* context, const SubscribeRequest* request,
@@ -36,7 +39,7 @@ class PolicyService final : public Policy::Service {
                                 EvaluationReportReply* reply) override;
 
  private:
-  // Waits for a version other than `have`; null once closed or where the wait was too long.
+  // Waits for a version other than `have`; null once closed, and after `timeout`.
   std::shared_ptr<const PolicyMessage> WaitForOther(std::uint64_t have, absl::Duration timeout);
 
   const std::function<void(const EvaluationReport&)> on_evaluation_;

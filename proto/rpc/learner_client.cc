@@ -6,6 +6,7 @@
 #include "proto/policy.grpc.pb.h"
 #include "proto/rpc/channel.h"
 #include "proto/rpc/grpc_status.h"
+#include "proto/rpc/protocol.h"
 
 namespace dbr {
 
@@ -27,6 +28,7 @@ absl::StatusOr<LearnerStatus> LearnerClient::Status(absl::Duration timeout) {
   SetDeadline(timeout, &context);
   LearnerStatus reply;
   RETURN_IF_ERROR(FromGrpc(impl_->stub().Status(&context, {}, &reply)));
+  RETURN_IF_ERROR(CheckProtocolVersion(reply.protocol_version(), "the learner", "this program"));
   return reply;
 }
 

@@ -11,17 +11,22 @@
 
 namespace dbr {
 
-// Thread-safe; calls block until their timeout. Errors carry the server's message: Unavailable where there is
-// no learner, DeadlineExceeded where it did not answer.
+// A connection to one learner. Thread-safe; calls block until their timeout. Errors carry the server's
+// message: Unavailable where there is no learner, DeadlineExceeded where it did not answer, Unimplemented
+// where another program listens at the address. IsFinal (proto/rpc/grpc_status.h) tells which of them another
+// call may mend.
 class LearnerClient {
  public:
+  // Connects in the background: an address where nobody listens is an error of the calls.
   explicit LearnerClient(const std::string& address);
   ~LearnerClient();
   LearnerClient(const LearnerClient&) = delete;
   LearnerClient& operator=(const LearnerClient&) = delete;
 
+  // FailedPrecondition where the learner speaks another protocol version (proto/rpc/protocol.h).
   absl::StatusOr<LearnerStatus> Status(absl::Duration timeout);
-  // InvalidArgument for a report without episodes or without a finite mean return.
+  // Hands over the result of an evaluation. InvalidArgument for a report without episodes or without a finite
+  // mean return.
   absl::Status ReportEvaluation(const EvaluationReport& report, absl::Duration timeout);
 
  private:

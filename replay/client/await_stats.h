@@ -9,9 +9,9 @@
 
 namespace dbr {
 
-// Asks until the server answers. Blocks; logs once, with `purpose`, that it waits. Errors: Cancelled, within
-// a second of `stopping`; the server's error where it is final (IsFinal), as from a server of another
-// program.
+// Asks once a second until the server answers, and logs once that it waits, with `purpose` ("to hear of its
+// newest labels"). Blocks. Errors: Cancelled within a second after `stopping`, and those that no waiting
+// mends (IsFinal): another program listens at the address, or one that speaks another protocol version.
 absl::StatusOr<StatsReply> AwaitStats(ReplayClient* client, absl::string_view purpose,
                                       const absl::Notification& stopping);
 

@@ -15,6 +15,7 @@
 #include "proto/rpc/channel.h"
 #include "proto/rpc/codec.h"
 #include "proto/rpc/grpc_status.h"
+#include "proto/rpc/protocol.h"
 
 namespace dbr {
 namespace {
@@ -138,6 +139,7 @@ absl::StatusOr<StatsReply> ReplayClient::Stats(absl::Duration timeout) {
   RETURN_IF_ERROR(impl_->Run(timeout, [&](grpc::ClientContext* context) {
     return impl_->stub().Stats(context, StatsRequest(), &reply);
   }));
+  RETURN_IF_ERROR(CheckProtocolVersion(reply.protocol_version(), "the replay server", "this program"));
   return reply;
 }
 

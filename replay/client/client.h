@@ -15,9 +15,9 @@
 
 namespace dbr {
 
-// How many transitions to draw.
+// How many transitions to draw, with replacement.
 struct DrawCounts {
-  int uniform = 0;  // from D
+  int uniform = 0;  // from D, all transitions
   int plus = 0;     // from D+
   int minus = 0;    // from D-
 };
@@ -27,25 +27,32 @@ struct DrawnBatches {
   Batch uniform;
   Batch plus;   // size 0 where D+ was empty
   Batch minus;  // size 0 where D- was empty
-  // Rows in D, in D+, in D- and not yet judged when the draw was made.
+  // Transitions in D, in D+, in D- and not yet judged at the time of the draw.
   std::uint64_t total_size = 0, plus_size = 0, minus_size = 0, unjudged_size = 0;
-  std::uint64_t inserted = 0, episodes = 0;  // so far, without the seed buffer's
+  std::uint64_t inserted = 0;  // transitions so far, without the seed buffer
+  std::uint64_t episodes = 0;  // that have ended so far
 };
 
-// Thread-safe. Calls block until their timeout. Errors carry the server's message: Unavailable where there is
-// no server, DeadlineExceeded where the rate limiter held the call (its counters and bounds are in the
-// message), Cancelled after Close.
+// A connection to one replay server. Thread-safe; calls block until their timeout. Errors carry the server's
+// message. Common to all calls: Unavailable where there is no server, DeadlineExceeded where it did not
+// answer in time, Unimplemented where another program listens at the address, Cancelled after Close. IsFinal
+// (proto/rpc/grpc_status.h) tells which of them another call may mend.
 class ReplayClient {
  public:
+  // Connects in the background: an address where nobody listens is an error of the calls.
   explicit ReplayClient(const std::string& address);
 
-  // Draws transitions that lie as `layout` says into `out`, with their keys. Empty partitions give batches of
-  // size 0. InvalidArgument where the server has another layout.
+  // Draws into `out`, all counts under one snapshot. An empty D+ or D- gives an empty batch; D must have
+  // something. DeadlineExceeded also where the rate limiter held the call (its counters and bounds are in the
+  // message); InvalidArgument where the server's transitions are not of `layout`, naming the width, and where
+  // the counts are 0 or ask for more than one message holds.
   absl::Status Sample(const DrawCounts& counts, const TransitionLayout& layout, absl::Duration timeout,
                       DrawnBatches* out);
-  // Sets the advantages of the rows `keys` [n], given by a critic of `critic_version`.
+  // Writes `advantages` [one for each key] of the critic `critic_version` to the transitions; the reply
+  // counts what was taken. InvalidArgument where the lengths differ.
   absl::StatusOr<RelabelReply> Relabel(std::uint64_t critic_version, absl::Span<const std::uint64_t> keys,
                                        absl::Span<const float> advantages, absl::Duration timeout);
+  // FailedPrecondition where the server speaks another protocol version (proto/rpc/protocol.h).
   absl::StatusOr<StatsReply> Stats(absl::Duration timeout);
 
   // Cancels the calls under way and fails later ones with Cancelled.

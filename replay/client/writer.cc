@@ -14,6 +14,7 @@
 #include "proto/replay.grpc.pb.h"
 #include "proto/rpc/channel.h"
 #include "proto/rpc/grpc_status.h"
+#include "proto/rpc/protocol.h"
 #include "replay/client/outbox.h"
 #include "spdlog/spdlog.h"
 
@@ -146,13 +147,17 @@ class TransitionWriter::Impl {
     broken_ = true;
   }
 
-  // Sends the opening message and takes its answer; false where the stream is broken.
-  bool Open(Stream* stream) ABSL_LOCKS_EXCLUDED(mutex_) {
+  // Sends the opening message and takes its answer. Unavailable where the stream is broken: its end says why.
+  // FailedPrecondition where the server speaks another protocol.
+  absl::Status Open(Stream* stream) ABSL_LOCKS_EXCLUDED(mutex_) {
     InsertRequest opening;
     opening.set_writer_name(options_.name);
     opening.set_writer_id(id_);
+    opening.set_protocol_version(kProtocolVersion);
     InsertReply reply;
-    if (!stream->Write(opening) || !stream->Read(&reply)) return false;
+    if (!stream->Write(opening) || !stream->Read(&reply)) return absl::UnavailableError("broken");
+    RETURN_IF_ERROR(CheckProtocolVersion(reply.protocol_version(), "the replay server",
+                                         absl::StrCat("the writer ", options_.name)));
     std::uint64_t resend;
     {
       absl::MutexLock lock(&mutex_);
@@ -167,7 +172,7 @@ class TransitionWriter::Impl {
           "{}: the replay server at {} is back; {} transitions are not acknowledged and are sent again",
           options_.name, options_.address, resend);
     }
-    return true;
+    return absl::OkStatus();
   }
 
   // One stream from its opening to its end.
@@ -183,7 +188,8 @@ class TransitionWriter::Impl {
       context_ = &context;
     }
     const auto stream = stub_->Insert(&context);
-    if (Open(stream.get())) {
+    const absl::Status opened = Open(stream.get());
+    if (opened.ok()) {
       failures_ = 0;
       std::thread reader([this, &stream] { ReadReplies(stream.get()); });
       while (const auto message = NextMessage()) {
@@ -191,10 +197,11 @@ class TransitionWriter::Impl {
       }
       reader.join();
     }
-    const grpc::Status status = stream->Finish();
+    if (IsFinal(opened)) context.TryCancel();
+    const grpc::Status ended = stream->Finish();
     absl::MutexLock lock(&mutex_);
     context_ = nullptr;
-    return FromGrpc(status);
+    return IsFinal(opened) ? opened : FromGrpc(ended);
   }
 
   void Run() ABSL_LOCKS_EXCLUDED(mutex_) {
@@ -206,8 +213,8 @@ class TransitionWriter::Impl {
         if (IsFinal(status)) final_error_ = status;
       }
       if (IsFinal(status)) {
-        spdlog::error("{}: the replay server at {} refuses this writer: {}", options_.name, options_.address,
-                      std::string(status.message()));
+        spdlog::error("{}: no more transitions to the replay server at {}: {}", options_.name,
+                      options_.address, std::string(status.message()));
         return;
       }
       if (!std::exchange(lost_, true)) {

@@ -13,37 +13,38 @@
 namespace dbr {
 
 struct WriterOptions {
-  std::string address;  // of the replay server
-  std::string name;     // for people: "actor-0"
-  TransitionLayout layout;
-  std::size_t batch_bytes = 32 << 10;                      // of one message
-  int window = 16;                                         // unacknowledged messages under way, at most
-  std::size_t buffered_transitions = 20000;                // not yet acknowledged; Append blocks past that
+  std::string address;                       // of the replay server: "unix:/path" or "host:port"
+  std::string name;                          // for people, 1 to 63 bytes: "actor-0"
+  TransitionLayout layout;                   // of every transition
+  std::size_t batch_bytes = 32 << 10;        // of one message's transitions, about
+  int window = 16;                           // unacknowledged messages under way
+  std::size_t buffered_transitions = 20000;  // not yet acknowledged; Append blocks past that
   absl::Duration max_batch_age = absl::Milliseconds(100);  // a message is sent at the latest after this
 };
 
-// Transitions so far, and streams that were opened after one was lost.
+// Transitions since the start of the writer, and streams.
 struct WriterCounters {
   std::uint64_t appended = 0;
-  std::uint64_t acknowledged = 0;
-  std::uint64_t refused = 0;  // non-finite, dropped by the server
-  std::uint64_t reconnects = 0;
+  std::uint64_t acknowledged = 0;  // stored by the server, or refused by it for good
+  std::uint64_t refused = 0;       // with values that are not finite, dropped by the server
+  std::uint64_t reconnects = 0;    // streams opened after a loss
 };
 
-// Thread-safe, but the order of transitions is that of the calls of Append: one thread appends. A thread of
-// the writer's own sends. Every transition gets the next sequence number of a writer id drawn at the start;
-// after a broken stream all that is not acknowledged is sent again, and the server drops what it holds
-// already. A loss of the server is logged once, and its return; retries back off with jitter up to 2 s.
+// Append is for one thread, the other functions for any; a thread of the writer's own sends. Every transition
+// gets the next sequence number of a writer id drawn at the start; after a broken stream all that is not
+// acknowledged is sent again and the server drops what it holds already. A loss of the server is logged once,
+// and its return; retries back off with jitter up to 2 s. An error that no retry mends (IsFinal,
+// proto/rpc/grpc_status.h: another layout, another protocol version, another program at the address) is
+// logged, ends the sending, and is what every later call returns.
 class TransitionWriter {
  public:
   explicit TransitionWriter(WriterOptions options);
   ~TransitionWriter();  // Close(), dropping what is not acknowledged
 
-  // Takes a transition with its first advantage, by a critic of that version, and the end of its episode
-  // where it ended one. Copies it. Blocks while the writer's buffer is full (the rate limiter holds inserts,
-  // or the server is away). Cancelled after Close; DeadlineExceeded after `timeout`; InvalidArgument where
-  // widths differ from the layout or the server refuses the layout (final: every later call answers the
-  // same).
+  // Copies a transition into the buffer. Blocks while the buffer is full (the rate limiter holds inserts, or
+  // the server is away). `advantage` may be kUnjudged, else it is that of the critic `critic_version`; `end`
+  // is set for the transition that ended an episode. Cancelled after Close; DeadlineExceeded after `timeout`;
+  // InvalidArgument where widths differ from the layout; the final error.
   absl::Status Append(const TransitionView& transition, float advantage, std::uint64_t critic_version,
                       const std::optional<EpisodeEnd>& end,
                       absl::Duration timeout = absl::InfiniteDuration());
@@ -53,7 +54,7 @@ class TransitionWriter {
 
   void Close();  // from any thread; wakes blocked calls
 
-  std::uint64_t id() const;  // never 0
+  std::uint64_t id() const;  // unique for each writer, never 0
   WriterCounters counters() const;
 
  private:

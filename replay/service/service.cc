@@ -4,9 +4,11 @@
 #include <vector>
 
 #include "absl/cleanup/cleanup.h"
+#include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "core/status_macros.h"
 #include "proto/rpc/grpc_status.h"
+#include "proto/rpc/protocol.h"
 #include "replay/service/service_codec.h"
 #include "spdlog/spdlog.h"
 
@@ -34,6 +36,12 @@ absl::Time WaitDeadline(const grpc::ServerContext& context, const SampleRequest&
   if (!request.has_wait_s()) return call_deadline - margin;
   const double wait_s = request.wait_s() > 0 ? request.wait_s() : 0;  // not a number: 0
   return std::min(call_deadline - margin, now + absl::Seconds(wait_s));
+}
+
+// An opening message of another version may say other things in its fields, so that this is asked first.
+absl::Status CheckVersion(const InsertRequest& opening) {
+  return CheckProtocolVersion(opening.protocol_version(), absl::StrCat("the writer ", opening.writer_name()),
+                              "the replay server");
 }
 
 void AddLatency(const char* call, const LatencyHistogram& histogram, StatsReply* reply) {
@@ -66,14 +74,14 @@ absl::Status ReplayService::Store(grpc::ServerContext* context, std::uint32_t pl
 
 absl::Status ReplayService::ReadInserts(grpc::ServerContext* context, std::uint32_t place,
                                         grpc::ServerReaderWriter<InsertReply, InsertRequest>* stream) {
+  InsertReply answer = Acknowledgement(place);
+  answer.set_protocol_version(kProtocolVersion);
+  if (!stream->Write(answer)) return absl::OkStatus();
   InsertRequest request;
-  bool acknowledge = true;
-  do {
-    if (acknowledge && !stream->Write(Acknowledgement(place))) break;
-    if (!stream->Read(&request)) break;
+  while (stream->Read(&request)) {
     RETURN_IF_ERROR(Store(context, place, request));
-    acknowledge = request.acknowledge();
-  } while (true);
+    if (request.acknowledge() && !stream->Write(Acknowledgement(place))) break;
+  }
   return absl::OkStatus();
 }
 
@@ -81,6 +89,7 @@ grpc::Status ReplayService::Insert(grpc::ServerContext* context,
                                    grpc::ServerReaderWriter<InsertReply, InsertRequest>* stream) {
   InsertRequest opening;
   if (!stream->Read(&opening)) return grpc::Status::OK;
+  if (const absl::Status version = CheckVersion(opening); !version.ok()) return ToGrpc(version);
   const auto identity = DecodeOpening(opening);
   if (!identity.ok()) return ToGrpc(identity.status());
   const auto place = buffer_->OpenWriter(*identity);
@@ -123,6 +132,7 @@ grpc::Status ReplayService::Relabel(grpc::ServerContext*, const RelabelRequest* 
 grpc::Status ReplayService::Stats(grpc::ServerContext*, const StatsRequest*, StatsReply* reply) {
   const LatencyTimer timer(&stats_latency_);
   Encode(buffer_->Stats(), reply);
+  reply->set_protocol_version(kProtocolVersion);
   AddLatency("insert", insert_latency_, reply);
   AddLatency("sample", sample_latency_, reply);
   AddLatency("relabel", relabel_latency_, reply);

@@ -9,9 +9,9 @@
 
 namespace dbr {
 
-// The calls of proto/replay.proto: each decodes, calls the buffer and encodes. Thread-safe. A call that waits
-// for the limiter checks every kCancelCheck whether its client is still there; PartitionedBuffer::Close ends
-// all waits.
+// Decodes, calls the buffer, encodes. Thread-safe. A call that waits for the limiter looks every kCancelCheck
+// whether its client is still there; PartitionedBuffer::Close ends all waits. A stream of inserts whose
+// opening message is of another protocol version is refused with FAILED_PRECONDITION (proto/rpc/protocol.h).
 class ReplayService final : public Replay::Service {
  public:
   static constexpr absl::Duration kCancelCheck = absl::Milliseconds(200);
@@ -28,7 +28,9 @@ class ReplayService final : public Replay::Service {
   grpc::Status Stats(grpc::ServerContext* context, const StatsRequest* request, StatsReply* reply) override;
 
  private:
+  // Stores the transitions of a message, if it has any; blocks while the limiter holds them.
   absl::Status Store(grpc::ServerContext* context, std::uint32_t place, const InsertRequest& request);
+  // Answers the opening message, then stores and acknowledges what comes until the stream ends.
   absl::Status ReadInserts(grpc::ServerContext* context, std::uint32_t place,
                            grpc::ServerReaderWriter<InsertReply, InsertRequest>* stream);
   InsertReply Acknowledgement(std::uint32_t place) const;

@@ -18,6 +18,7 @@
 #include "gtest/gtest.h"
 #include "proto/policy.grpc.pb.h"
 #include "proto/rpc/codec.h"
+#include "proto/rpc/protocol.h"
 #include "proto/rpc/server.h"
 
 namespace dbr {
@@ -41,8 +42,8 @@ class SocketFolder {
 // Serves from construction to destruction. Thread-safe.
 class LearnerDouble : public Policy::Service {
  public:
-  explicit LearnerDouble(const std::string& address)
-      : running_(StartServer({.address = address}, {this}).value()) {}
+  explicit LearnerDouble(const std::string& address, std::uint32_t protocol_version = kProtocolVersion)
+      : protocol_version_(protocol_version), running_(StartServer({.address = address}, {this}).value()) {}
   ~LearnerDouble() override {
     {
       absl::MutexLock lock(&mutex_);
@@ -52,6 +53,7 @@ class LearnerDouble : public Policy::Service {
   }
 
   void Offer(PolicyMessage message) {
+    message.set_protocol_version(protocol_version_);
     absl::MutexLock lock(&mutex_);
     newest_ = std::move(message);
     ++offers_;
@@ -116,6 +118,7 @@ class LearnerDouble : public Policy::Service {
   }
 
  private:
+  const std::uint32_t protocol_version_;
   mutable absl::Mutex mutex_;
   bool closed_ = false;
   int offers_ = 0;

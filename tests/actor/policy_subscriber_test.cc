@@ -113,6 +113,28 @@ TEST_F(PolicySubscriberTest, RefusesPoliciesWithMissingParametersForGood) {
   EXPECT_THAT(std::string(status.message()), HasSubstr(kCritic1));
 }
 
+TEST_F(PolicySubscriberTest, RefusesALearnerOfAnotherProtocolForGood) {
+  for (const std::uint32_t version : {std::uint32_t{0}, kProtocolVersion + 1}) {
+    LearnerDouble learner(address_, version);
+    learner.Offer(Version(1));
+    const auto subscriber = Subscribe();
+    const absl::Status status = subscriber->WaitForFirst(kLong).status();
+    EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
+    EXPECT_THAT(std::string(status.message()),
+                HasSubstr(version == 0 ? "the learner is older" : "actor-0 is older"));
+    EXPECT_EQ(subscriber->Current().status(), status);
+    EXPECT_EQ(learner.subscriptions(), 1);
+  }
+}
+
+TEST_F(PolicySubscriberTest, TakesAPolicyWithAFieldThatItDoesNotKnow) {
+  LearnerDouble learner(address_);
+  PolicyMessage newer = Version(1);
+  newer.GetReflection()->MutableUnknownFields(&newer)->AddVarint(1000, 7);
+  learner.Offer(newer);
+  EXPECT_TRUE(Subscribe()->WaitForFirst(kLong).ok());
+}
+
 TEST_F(PolicySubscriberTest, SaysThatAServerIsNoLearner) {
   const RunningServer server = StartServer({.address = address_}, {}).value();
   const absl::Status status = Subscribe()->WaitForFirst(kLong).status();

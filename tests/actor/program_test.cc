@@ -163,6 +163,14 @@ TEST_F(ProgramTest, APolicyOfOtherSizesExitsWith1) {
   EXPECT_THAT(actor.output(), HasSubstr("hidden_sizes: expected 32-16, found 16-16"));
 }
 
+TEST_F(ProgramTest, ALearnerOfAnotherProtocolExitsWith1AndSaysWhichProgramIsOlder) {
+  LearnerDouble learner(folder_.Address("learner"), /*protocol_version=*/0);
+  learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
+  Program actor(Flags(kSmall));
+  EXPECT_EQ(actor.Wait(), 1);
+  EXPECT_THAT(actor.output(), HasSubstr("found 0 (a program from before 0.2.0): the learner is older"));
+}
+
 TEST_F(ProgramTest, EvaluatorReportsToTheLearnerUntilItIsStopped) {
   LearnerDouble learner(folder_.Address("learner"));
   learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 7)));

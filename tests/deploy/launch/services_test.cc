@@ -15,12 +15,14 @@
 #include "proto/config/config_file.h"
 #include "proto/policy.grpc.pb.h"
 #include "proto/replay.grpc.pb.h"
+#include "proto/rpc/protocol.h"
 #include "proto/rpc/server.h"
 #include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 constexpr absl::Duration kLong = absl::Seconds(60);  // reached only where something is wrong
@@ -30,6 +32,7 @@ class FixedReplay : public Replay::Service {
  public:
   grpc::Status Stats(grpc::ServerContext*, const StatsRequest*, StatsReply* reply) override {
     reply->set_inserted(77);
+    reply->set_protocol_version(kProtocolVersion);
     return grpc::Status::OK;
   }
 };
@@ -37,8 +40,11 @@ class FixedLearner : public Policy::Service {
  public:
   grpc::Status Status(grpc::ServerContext*, const LearnerStatusRequest*, LearnerStatus* reply) override {
     reply->set_updates(5);
+    reply->set_protocol_version(protocol_version);
     return grpc::Status::OK;
   }
+
+  std::uint32_t protocol_version = kProtocolVersion;
 };
 
 TEST(HealthCheckTest, AnswersWhenTheServerServes) {
@@ -62,6 +68,20 @@ TEST(HealthCheckTest, NamesTheAddressThatDoesNotAnswer) {
   answered.WaitForNotification();
   EXPECT_EQ(check.result()->code(), absl::StatusCode::kDeadlineExceeded);
   EXPECT_THAT(std::string(check.result()->message()), HasSubstr(folder.path()));
+}
+
+TEST(HealthCheckTest, TellsAServerThatAnswersFromOneThatServes) {
+  TempDir folder;
+  const std::string address = absl::StrCat("unix:", folder / "s");
+  FixedReplay replay;
+  const auto server = StartServer({.address = address}, {&replay});
+  ASSERT_TRUE(server.ok()) << server.status();
+  server->server->GetHealthCheckService()->SetServingStatus(false);
+  absl::Notification answered;
+  const HealthCheck check(address, kLong, [&] { answered.Notify(); });
+  answered.WaitForNotification();
+  EXPECT_EQ(check.result()->code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(std::string(check.result()->message()), HasSubstr("not serving"));
 }
 
 TEST(HealthCheckTest, EndsWhenItIsNoLongerWanted) {
@@ -93,6 +113,26 @@ TEST(RunMonitorTest, KeepsTheNewestAnswersWhileAServiceIsAway) {
   EXPECT_TRUE(sample.learner_away);
   EXPECT_EQ(sample.learner->updates(), 5);
   EXPECT_FALSE(sample.replay_away);
+}
+
+TEST(RunMonitorTest, KeepsTheRefusalOfAServiceOfAnotherProtocol) {
+  TempDir folder;
+  const std::string replay_address = absl::StrCat("unix:", folder / "r");
+  const std::string learner_address = absl::StrCat("unix:", folder / "l");
+  FixedReplay replay;
+  FixedLearner learner;
+  learner.protocol_version = 0;
+  const auto replay_server = StartServer({.address = replay_address}, {&replay});
+  const auto learner_server = StartServer({.address = learner_address}, {&learner});
+  ASSERT_TRUE(replay_server.ok() && learner_server.ok());
+  absl::Notification sampled;
+  RunMonitor monitor(replay_address, learner_address, absl::ZeroDuration(), [&] { sampled.Notify(); });
+  sampled.WaitForNotification();  // which would end the test if there were a second round
+  const RunSample sample = monitor.Latest();
+  EXPECT_EQ(sample.refusal.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(sample.refusal.message()),
+              AllOf(HasSubstr(learner_address), HasSubstr("the learner is older than this program")));
+  EXPECT_EQ(sample.replay->inserted(), 77);
 }
 
 TEST(ReplayAddressTest, TakesAddressesAndRunFolders) {

@@ -6,6 +6,8 @@
 
 #include "proto/rpc/channel.h"
 #include "proto/rpc/codec.h"
+#include "proto/rpc/learner_client.h"
+#include "proto/rpc/protocol.h"
 #include "proto/rpc/server.h"
 #include "tests/support/temp_dir.h"
 
@@ -19,6 +21,13 @@ PolicySnapshot Snapshot(std::uint64_t version) {
   snapshot.spec = {"test", "dbr", 1, {ActionKind::kDiscrete, 2}, {}};
   snapshot.networks = {{kPolicyNetwork, {static_cast<float>(version), 2, 3, 4}}};
   return snapshot;
+}
+
+SubscribeRequest Opening(std::uint32_t protocol_version = kProtocolVersion) {
+  SubscribeRequest request;
+  request.set_subscriber("actor-0");
+  request.set_protocol_version(protocol_version);
+  return request;
 }
 
 class PolicyServiceTest : public testing::Test {
@@ -46,7 +55,7 @@ class PolicyServiceTest : public testing::Test {
 TEST_F(PolicyServiceTest, SubscribersGetTheNewestAndThenEachNewerOne) {
   service_.Publish(Snapshot(1));
   service_.Publish(Snapshot(2));
-  const auto reader = stub_->Subscribe(&context_, SubscribeRequest());
+  const auto reader = stub_->Subscribe(&context_, Opening());
   PolicyMessage message;
   ASSERT_TRUE(reader->Read(&message));
   const auto snapshot = Decode(message);
@@ -63,7 +72,7 @@ TEST_F(PolicyServiceTest, StatusNamesTheSlowestSubscriber) {
   LearnerStatus status;
   status.set_policy_version(4);
   service_.SetStatus(status);
-  const auto reader = stub_->Subscribe(&context_, SubscribeRequest());
+  const auto reader = stub_->Subscribe(&context_, Opening());
   PolicyMessage message;
   ASSERT_TRUE(reader->Read(&message));
   // The service records the version after the write, so the next message comes after that.
@@ -76,9 +85,52 @@ TEST_F(PolicyServiceTest, StatusNamesTheSlowestSubscriber) {
   EXPECT_EQ(reply.oldest_subscriber_version(), 4u);
 }
 
+TEST_F(PolicyServiceTest, ASubscriberOfAnotherProtocolIsRefusedAndToldWhichProgramIsOlder) {
+  service_.Publish(Snapshot(1));
+  for (const std::uint32_t version : {std::uint32_t{0}, kProtocolVersion + 1}) {
+    grpc::ClientContext context;
+    const auto reader = stub_->Subscribe(&context, Opening(version));
+    PolicyMessage message;
+    EXPECT_FALSE(reader->Read(&message));
+    const grpc::Status status = reader->Finish();
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+    EXPECT_THAT(status.error_message(),
+                testing::HasSubstr(version == 0 ? "the subscriber actor-0 is older than the learner"
+                                                : "the learner is older than the subscriber actor-0"));
+  }
+}
+
+TEST_F(PolicyServiceTest, ASubscriberThatSaysMoreThanTheServiceKnowsIsServed) {
+  service_.Publish(Snapshot(1));
+  SubscribeRequest newer = Opening();
+  newer.GetReflection()->MutableUnknownFields(&newer)->AddVarint(1000, 7);
+  const auto reader = stub_->Subscribe(&context_, newer);
+  PolicyMessage message;
+  ASSERT_TRUE(reader->Read(&message));
+  EXPECT_EQ(message.protocol_version(), kProtocolVersion);
+}
+
+TEST_F(PolicyServiceTest, StatusSaysTheProtocolAndAClientRefusesAnother) {
+  LearnerClient client(running_.address);
+  const auto status = client.Status(absl::Seconds(20));
+  ASSERT_TRUE(status.ok()) << status.status();
+  EXPECT_EQ(status->protocol_version(), kProtocolVersion);
+
+  class OldLearner : public Policy::Service {
+    grpc::Status Status(grpc::ServerContext*, const LearnerStatusRequest*, LearnerStatus*) override {
+      return grpc::Status::OK;
+    }
+  } old;
+  const auto server = StartServer({"unix:" + folder_.path() + "/old.sock"}, {&old});
+  ASSERT_TRUE(server.ok()) << server.status();
+  const absl::Status refused = LearnerClient(server->address).Status(absl::Seconds(20)).status();
+  EXPECT_TRUE(absl::IsFailedPrecondition(refused)) << refused;
+  EXPECT_THAT(std::string(refused.message()), testing::HasSubstr("the learner is older than this program"));
+}
+
 TEST_F(PolicyServiceTest, CloseEndsSubscriptions) {
   service_.Publish(Snapshot(1));
-  const auto reader = stub_->Subscribe(&context_, SubscribeRequest());
+  const auto reader = stub_->Subscribe(&context_, Opening());
   PolicyMessage message;
   ASSERT_TRUE(reader->Read(&message));
   service_.Close();

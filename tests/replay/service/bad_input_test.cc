@@ -14,6 +14,7 @@
 #include "proto/replay.grpc.pb.h"
 #include "proto/rpc/channel.h"
 #include "proto/rpc/codec.h"
+#include "proto/rpc/protocol.h"
 #include "replay/client/client.h"
 #include "replay/service/replay_server.h"
 #include "tests/replay/rows.h"
@@ -37,6 +38,7 @@ class BadInput : public ::testing::Test {
     stub_ = Replay::NewStub(MakeChannel(server_->address()));
     opening_.set_writer_name("actor-0");
     opening_.set_writer_id(5);
+    opening_.set_protocol_version(kProtocolVersion);
     SetLayout(kSmallLayout, good_.mutable_transitions());
     good_.set_first_sequence(1);
     const Rows rows(kSmallLayout, 1, 5);
