@@ -8,17 +8,19 @@
 
 namespace dbr {
 
-// No weight decay; bias-corrected as in the paper's algorithm 1. One thread at a time.
+// The optimizer's state for one parameter vector, which the caller owns: both moments and the number of
+// steps. Bias-corrected as in the paper's algorithm 1, without weight decay. One thread at a time.
 template <class Scalar>
 class Adam {
  public:
-  Adam() = default;
+  Adam() = default;  // for no parameters
   Adam(Eigen::Index size, double learning_rate)
       : learning_rate_(learning_rate),
         first_(VectorX<Scalar>::Zero(size)),
         second_(VectorX<Scalar>::Zero(size)) {}
 
-  // parameters -= learning_rate * m^ / (sqrt(v^) + 1e-8), in one pass.
+  // parameters -= learning_rate * m^ / (sqrt(v^) + 1e-8), in one pass. `gradient` and `parameters` have the
+  // optimizer's size. O(size), allocates nothing.
   void Step(const VectorX<Scalar>& gradient, VectorX<Scalar>* parameters) {
     constexpr double kBeta1 = 0.9, kBeta2 = 0.999, kEpsilon = 1e-8;
     ++steps_;

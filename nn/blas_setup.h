@@ -1,5 +1,5 @@
-// How OpenBLAS works in our programs: with no threads but the caller's, always, for we place threads
-// ourselves; and with a kernel that suits the processor.
+// How OpenBLAS works in our programs: in the caller's thread alone, because we place threads ourselves, and
+// with a kernel that suits the processor.
 #pragma once
 
 namespace dbr {
@@ -7,14 +7,14 @@ namespace dbr {
 // Keeps OpenBLAS from using threads of its own for matrix products.
 void UseOneBlasThread();
 
-// Sets OpenBLAS up for a whole program and the programs that it starts, in the first line of its main, before
-// signals are blocked: executes the program again in the same process, with OPENBLAS_NUM_THREADS=1 and, where
-// SlowKernel() says so, OPENBLAS_CORETYPE. Both are read when OpenBLAS is loaded, and its threads start
-// there, where no mask of ours reaches: such a thread would take a SIGTERM and the program would die without
-// draining. Does nothing where OPENBLAS_NUM_THREADS is 1 already.
+// Sets OpenBLAS up for a whole program and the programs that it starts. Belongs in the first line of main,
+// before signals are blocked: it executes the program again in the same process, with OPENBLAS_NUM_THREADS=1
+// and, where SlowKernel() says so, OPENBLAS_CORETYPE. OpenBLAS reads both while it is loaded and starts its
+// threads then, before main can block a signal: such a thread would take a SIGTERM and the program would die
+// without draining. Does nothing where OPENBLAS_NUM_THREADS is 1 already.
 void RestartWithBlasSetUp(char** argv);
 
-// A matrix product of kTrialSize^3 by a plain loop: c = a b, all column-major [kTrialSize x kTrialSize].
+// A matrix product by a plain loop: c = a b, all column-major [kTrialSize x kTrialSize].
 inline constexpr int kTrialSize = 64;
 void PlainProduct(const float* a, const float* b, float* c);
 

@@ -13,24 +13,26 @@ namespace dbr {
 inline constexpr LogStdLimits kLatentLogStd{-4, 15};
 
 struct CvaeShape {
-  // `hidden_sizes` of the encoder; the decoder has the same.
+  // `hidden_sizes` are those of the encoder and of the decoder alike.
   CvaeShape(int observation_size, int action_size, const std::vector<int>& hidden_sizes);
 
-  int latent_size;   // twice the action's
+  int latent_size;   // twice the number of action dimensions
   MlpShape encoder;  // [observation; action] -> means and log-stds of the latent [2 * latent]
   MlpShape decoder;  // [observation; latent] -> the action before its tanh
 
-  // Useful operations for n samples.
+  // Useful floating-point operations for n samples (nn/mlp.h).
   double GradientFlops(Eigen::Index n) const;
   double DecodeFlops(Eigen::Index n) const { return decoder.ForwardFlops(n); }
 };
 
+// The caller's parameters of both networks.
 template <class Scalar>
 struct CvaeParameters {
   const VectorX<Scalar>& encoder;
   const VectorX<Scalar>& decoder;
 };
 
+// What a gradient is taken on.
 template <class Scalar>
 struct CvaeBatch {
   const MatrixX<Scalar>& observations;  // [observation x n]
@@ -38,9 +40,10 @@ struct CvaeBatch {
   const MatrixX<Scalar>& noise;         // [latent x n], standard normal
 };
 
+// The loss of a batch and its two terms.
 template <class Scalar>
 struct CvaeLoss {
-  Scalar loss = 0;
+  Scalar loss = 0;            // reconstruction + kl_weight * kl
   Scalar reconstruction = 0;  // mean over batch and dimensions of (tanh(decoded) - action)^2
   Scalar kl = 0;              // mean over batch and latent dimensions of KL to N(0, 1), nats
 };
@@ -54,9 +57,9 @@ class Cvae {
 
   const CvaeShape& shape() const { return shape_; }
 
-  // reconstruction + kl_weight * kl, the latent drawn as mean + std * noise, and its gradients with respect
-  // to the parameters of both networks, which are overwritten. Each network is passed once either way: the
-  // encoder's gradient comes through the decoder's deltas.
+  // The loss with the latent drawn as mean + std * noise, and its gradients with respect to the parameters of
+  // both networks, which are overwritten. Each network is passed once in each direction: the encoder's
+  // gradient comes through the decoder's deltas.
   CvaeLoss<Scalar> Gradient(const CvaeParameters<Scalar>& parameters, const CvaeBatch<Scalar>& batch,
                             Scalar kl_weight, VectorX<Scalar>* d_encoder, VectorX<Scalar>* d_decoder);
 
@@ -66,9 +69,10 @@ class Cvae {
                                 const MatrixX<Scalar>& latents);
 
  private:
-  // Sets d_decoded_ and gives the reconstruction's loss.
+  // Sets d_decoded_ and returns the reconstruction's loss.
   Scalar Reconstruct(const MatrixX<Scalar>& decoded, const MatrixX<Scalar>& actions);
-  // Sets the latent's gradient, the decoder's d_decoder_input_ included, and gives the mean KL.
+  // Sets the latent's gradient, the part that comes through d_decoder_input_ included, and returns the mean
+  // KL.
   Scalar Regularize(Scalar kl_weight);
 
   CvaeShape shape_;

@@ -6,9 +6,10 @@
 
 namespace dbr {
 
-// Pure functions of columns, float and double; outputs are resized, which allocates nothing where they have
-// their size already. Every value is [n], one for each column (state); a gradient is that of the sum of the
-// values, so that a caller weighs states by scaling its columns. Gradient outputs may be null.
+// The functions here are pure, work column by column, and exist for float and double; outputs are resized,
+// which allocates nothing where they have their size already. Every value is [n], one for each column
+// (state); a gradient is that of the sum of the values, so that a caller weighs states by scaling its
+// columns. Gradient outputs may be null.
 //
 // An MMD is sqrt(E k(x,x') + E k(y,y') - 2 E k(x,y) + kMmdFloor): the floor keeps its gradient finite at 0.
 inline constexpr double kMmdFloor = 1e-6;

@@ -6,13 +6,15 @@
 
 namespace dbr {
 
-// Parameters in memory of somebody else's (two halves of a network's output, for example).
+// The parameters of n Gaussians, in memory that somebody else owns (two halves of a network's output, for
+// example).
 template <class Scalar>
 struct GaussianView {
   ConstMatrixRef<Scalar> mean;     // [dimensions x n]
   ConstMatrixRef<Scalar> log_std;  // [dimensions x n], clipped already
 };
 
+// The gradient of a loss with respect to the parameters of n Gaussians.
 template <class Scalar>
 struct GaussianGradient {
   MatrixX<Scalar> mean;     // [dimensions x n]

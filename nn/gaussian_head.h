@@ -13,11 +13,12 @@ struct LogStdLimits {
 inline constexpr LogStdLimits kPolicyLogStd{-20, 2};
 inline constexpr LogStdLimits kBehaviorLogStd{-5, 2};
 
-// Plain value, reused from batch to batch.
+// The Gaussians of one batch as a network gave them. A plain value, reused from batch to batch; one thread at
+// a time.
 template <class Scalar>
 class GaussianHead {
  public:
-  // Takes the output [2 * dimensions x n] of a network apart.
+  // Copies means and clipped log-stds out of a network's output [2 * dimensions x n].
   void Split(const ConstMatrixRef<Scalar>& output, const LogStdLimits& limits) {
     const Eigen::Index dimensions = output.rows() / 2;
     const auto min = static_cast<Scalar>(limits.min), max = static_cast<Scalar>(limits.max);
@@ -31,7 +32,8 @@ class GaussianHead {
   const MatrixX<Scalar>& mean() const { return mean_; }
   const MatrixX<Scalar>& log_std() const { return log_std_; }
 
-  // The gradient with respect to the output [2 * dimensions x n]; 0 for a log-std that was clipped.
+  // Turns a gradient with respect to the Gaussians into one with respect to the network's output
+  // [2 * dimensions x n], which is 0 for a log-std that was clipped.
   void Join(const GaussianGradient<Scalar>& gradient, MatrixX<Scalar>* d_output) const {
     d_output->resize(2 * mean_.rows(), mean_.cols());
     d_output->topRows(mean_.rows()) = gradient.mean;

@@ -25,22 +25,22 @@ class MlpShape {
   Eigen::Index bias_offset(int layer) const { return offsets_[layer] + Eigen::Index{in(layer)} * out(layer); }
   Eigen::Index parameter_count() const { return offsets_.back(); }
 
-  // Useful floating-point operations of the matrix products for n samples: 2 m n k each.
+  // Useful floating-point operations of the matrix products for n samples: 2 m n k each. Those of the
+  // gradient are the weight gradients and the deltas of all layers but the input.
   double ForwardFlops(Eigen::Index n) const;
-  double ParameterGradientFlops(
-      Eigen::Index n) const;  // weight gradients, and the deltas of all layers but the input
+  double ParameterGradientFlops(Eigen::Index n) const;
 
  private:
-  std::vector<int> sizes_;
-  std::vector<Eigen::Index> offsets_;
+  std::vector<int> sizes_;             // of the input, then of each layer's output
+  std::vector<Eigen::Index> offsets_;  // of each layer's weight, then of the vector's end
 };
 
 // What a forward pass leaves for its backward pass; owned by the caller, reused from batch to batch.
 template <class Scalar>
 struct MlpActivations {
-  std::vector<MatrixX<Scalar>> outputs;  // of each layer after its ReLU (the last one has none): [out x n]
-  std::vector<MatrixX<Scalar>> deltas;   // of each layer's input but the first: [in x n]
-  MatrixX<Scalar> active_dy;             // of MlpInputGradient
+  std::vector<MatrixX<Scalar>> outputs;  // [out x n] each layer's output after its ReLU (the last has none)
+  std::vector<MatrixX<Scalar>> deltas;   // [in x n] the gradient at each layer's input but the first's
+  MatrixX<Scalar> active_dy;             // workspace of MlpInputGradient: the columns of dy that are not 0
 };
 
 template <class Scalar>

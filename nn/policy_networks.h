@@ -11,28 +11,29 @@
 
 namespace dbr {
 
-// Over discrete actions every network maps an observation to a value for each action. Over continuous ones
-// the policy and the behaviour policies map it to means and log-stds [2 * dimensions], a critic maps
-// [observation; action] to one value.
+// The layers of a policy's networks. Over discrete actions every network maps an observation to a value for
+// each action. Over continuous ones the policy and the behaviour policies map it to means and log-stds
+// [2 * dimensions], and a critic maps [observation; action] to one value.
 MlpShape PolicyShape(const PolicySpec& spec);
 MlpShape CriticShape(const PolicySpec& spec);
 
 // Immutable; shared by pointer between threads. Holds the snapshot that it was made from.
 class PolicyNetworks {
  public:
-  // InvalidArgument where a network is missing or its parameters are not as many as the spec asks; names the
-  // network.
+  // InvalidArgument where a size is not above 0, the network "policy" is missing, or a network has not as
+  // many parameters as its sizes ask; the message names the network.
   static absl::StatusOr<std::shared_ptr<const PolicyNetworks>> Create(PolicySnapshot snapshot);
 
   const PolicySnapshot& snapshot() const { return snapshot_; }
   const PolicySpec& spec() const { return snapshot_.spec; }
   const MlpShape& policy_shape() const { return policy_shape_; }
   const MlpShape& critic_shape() const { return critic_shape_; }
-  bool has_critics() const;
+  bool has_critics() const;        // both twins
   bool has_dual_behavior() const;  // beta+ and beta-
-  bool has_behavior() const;       // one beta of all the data
+  bool has_behavior() const;       // one beta, fitted to all the data
 
-  // (observation - mean) / deviation [observation x n] where the policy was trained on that, else false.
+  // True, with (observation - mean) / deviation [observation x n] in `normalized`, where the policy was
+  // trained on that; else false, and `normalized` stays as it is.
   bool Normalize(const ConstMatrixRef<float>& observations, MatrixX<float>* normalized) const;
 
  private:

@@ -11,7 +11,7 @@
 
 namespace dbr {
 
-// A matrix in column-major memory of somebody else's.
+// A matrix in column-major memory that somebody else owns.
 template <class Scalar>
 struct Operand {
   const Scalar* values;
@@ -21,6 +21,7 @@ struct Operand {
   bool transposed = false;  // stored as [cols x rows]
 };
 
+// The same memory read as the transposed matrix.
 template <class Scalar>
 Operand<Scalar> Transposed(const Operand<Scalar>& a) {
   return {a.values, a.cols, a.rows, a.stride, !a.transposed};

@@ -5,33 +5,35 @@
 
 namespace dbr {
 
-// Pure functions of columns, float and double; noise is an argument. Outputs are resized, which allocates
-// nothing where they have their size already.
+// The functions here are pure, work column by column, and exist for float and double; noise is an argument.
+// Outputs are resized, which allocates nothing where they have their size already.
 
-// Data's actions are clipped to +-kActionLimit: on data of a deterministic policy the likelihood has no upper
-// bound else.
+// The actions of data are clipped to +-kActionLimit before their likelihood is taken: on data of a
+// deterministic policy the likelihood would have no upper bound otherwise.
 inline constexpr double kActionLimit = 1 - 1e-5;
 
+// One draw for each column.
 template <class Scalar>
 struct TanhSample {
   MatrixX<Scalar> before_tanh;  // [dimensions x n] u = mean + exp(log_std) * noise
   MatrixX<Scalar> action;       // [dimensions x n] tanh(u)
   VectorX<Scalar> log_prob;     // [n] density of the action, the tanh's change of variables included
-  MatrixX<Scalar> terms;        // [dimensions x n] of log_prob
+  MatrixX<Scalar> terms;        // [dimensions x n] what each dimension adds to log_prob
 };
 
-// noise [dimensions x n], standard normal.
+// Draws a sample with its log-probabilities. noise [dimensions x n], standard normal.
 template <class Scalar>
 void SampleTanhGaussian(const GaussianView<Scalar>& gaussian, const ConstMatrixRef<Scalar>& noise,
                         TanhSample<Scalar>* sample);
 
-// Without the log-probabilities, whose logarithms take longer than the rest.
+// Draws a sample without its log-probabilities, whose logarithms take longer than the rest.
 template <class Scalar>
 void SampleTanhActions(const GaussianView<Scalar>& gaussian, const ConstMatrixRef<Scalar>& noise,
                        TanhSample<Scalar>* sample);
 
-// The gradient through a sample (pathwise): from those with respect to its actions, d_action [dimensions x
-// n], and its log-probabilities, d_log_prob [n], to one with respect to the parameters.
+// The gradients of a loss with respect to a sample's actions, d_action [dimensions x n], and to its
+// log-probabilities, d_log_prob [n]. BackpropTanhSample turns them into the gradient with respect to the
+// parameters, through the sample (pathwise).
 template <class Scalar>
 struct TanhSampleGradient {
   ConstMatrixRef<Scalar> d_action;

@@ -10,17 +10,18 @@
 
 namespace dbr {
 
-// One thread at a time. Not copyable.
+// A file open for writing at its end. One thread at a time. Nobody else may write to the file meanwhile.
 class AppendFile {
  public:
-  // Opens or creates `path` and positions at its end. Errors as core/file_io.h names them.
+  // Opens or creates `path` and positions at its end. Errors name the path: NotFound where its folder is
+  // missing, PermissionDenied, ResourceExhausted, Internal.
   static absl::StatusOr<std::unique_ptr<AppendFile>> Open(const std::string& path);
   ~AppendFile();
   AppendFile(const AppendFile&) = delete;
   AppendFile& operator=(const AppendFile&) = delete;
 
   // Cuts off what follows the last line's end: the part of a row that a killed process left behind. Reads at
-  // most the file's last 1 MiB.
+  // most the file's last 1 MiB. Errors as Open's.
   absl::Status DropPartialLine();
 
   // Writes all of `records` at the end, or nothing: a partial write (ResourceExhausted: the disk is full) is

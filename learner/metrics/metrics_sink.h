@@ -16,8 +16,8 @@
 
 namespace dbr {
 
-// Tags that Stable-Baselines3 gives the same quantities, so that its users' dashboards fit. Others are
-// "ROOM/name".
+// Tags that Stable-Baselines3 gives the same quantities, so that its users' dashboards fit. Other tags begin
+// with who measured: "replay/total", "learner/starved_share".
 namespace tags {
 inline constexpr char kEpisodeReturn[] = "rollout/ep_rew_mean";
 inline constexpr char kEpisodeLength[] = "rollout/ep_len_mean";
@@ -32,9 +32,9 @@ inline constexpr char kEvaluationReturn[] = "eval/mean_reward";
 inline constexpr char kEvaluationScore[] = "eval/success_rate";
 }  // namespace tags
 
-// Thread-safe. A row is written by the first call at or after `flush_interval` from the write before, by
-// Flush, or by the destructor. Nothing is lost by an error: what could not be written is tried again by the
-// next call.
+// The two files that a run's figures go to. Thread-safe. A row is written to disk by the first call of Write
+// at or after `flush_interval` from the write before, by Flush, or by the destructor. Nothing is lost by an
+// error: what could not be written is tried again by the next call that writes.
 class MetricsSink {
  public:
   // Appends to `folder`'s metrics.jsonl, which a resumed run goes on with (a row that a killed process left

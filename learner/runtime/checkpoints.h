@@ -11,15 +11,18 @@
 
 namespace dbr {
 
-// Files named UPDATES.safetensors in a folder. One thread at a time.
+// Files named UPDATES.safetensors (12 digits) in a folder, which docs/formats.md describes. One thread at a
+// time.
 class Checkpoints {
  public:
   // Keeps the newest `keep` files (at least 1).
   Checkpoints(std::string folder, int keep) : folder_(std::move(folder)), keep_(keep) {}
 
-  // Writes atomically (core/file_io.h), then removes files past `keep`.
+  // Writes atomically (core/file_io.h), then removes the oldest files past `keep`. Creates the folder. Errors
+  // are those of SaveTensors (core/safetensors.h); nothing is removed then.
   absl::Status Save(std::uint64_t updates, const TensorFile& file);
 
+  // What LoadNewest found.
   struct Loaded {
     TensorFile file;
     std::string path;

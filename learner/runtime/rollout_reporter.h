@@ -12,12 +12,12 @@
 namespace dbr {
 
 // Asks for the statistics every `period` in a thread of its own and writes a row of metrics for each answer,
-// at the number of inserted transitions as its step.
+// whose step is the number of inserted transitions. A question without an answer is passed over.
 class RolloutReporter {
  public:
-  // Both outlive the reporter.
+  // `client` and `metrics` outlive the reporter, which closes the client.
   RolloutReporter(ReplayClient* client, MetricsSink* metrics, absl::Duration period);
-  ~RolloutReporter();
+  ~RolloutReporter();  // ends a question under way and joins
 
  private:
   void Run();

@@ -15,31 +15,34 @@
 
 namespace dbr {
 
-// One state of the learner.
+// The learner's state after `updates` updates.
 struct Checkpoint {
   std::uint64_t updates = 0;
-  TensorFile state;
-  PolicySnapshot policy;
+  TensorFile state;       // what Trainer::Load takes
+  PolicySnapshot policy;  // what actors and evaluators act by
 };
 
-// Writes in a thread of its own: checkpoints/UPDATES.safetensors and policy/latest.safetensors. An error (a
-// full disk) is logged and what stood there before stays; training goes on.
+// Writes checkpoints in a thread of its own: checkpoints/UPDATES.safetensors and policy/latest.safetensors
+// (docs/formats.md). An error (a full disk) is logged and what stood there before stays; training goes on.
+// Thread-safe.
 class Saver {
  public:
+  // Keeps the newest `keep` checkpoints. Creates the folder of the policy.
   Saver(const RunFolder& folder, int keep);
   ~Saver();  // finishes the write under way and joins
 
   // Does not block; false, and nothing is written, where the one offered before still waits its turn.
   bool Offer(Checkpoint checkpoint);
-  // Writes now, after what is under way, in the calling thread; what was offered earlier and waits is written
-  // no more.
+  // Writes now, after what is under way, in the calling thread. A checkpoint older than one that is written
+  // already is left out, so that one offered earlier which still waits does not take its place. Errors are
+  // those of SaveTensors (core/safetensors.h).
   absl::Status SaveNow(const Checkpoint& checkpoint);
 
  private:
   void Run();
 
   const RunFolder folder_;
-  absl::Mutex writing_;
+  absl::Mutex writing_;  // held while files are written, by either thread
   Checkpoints checkpoints_ ABSL_GUARDED_BY(writing_);
   std::uint64_t written_ ABSL_GUARDED_BY(writing_) = 0;  // the updates of the newest one on disk
   BoundedQueue<Checkpoint> queue_;

@@ -21,21 +21,23 @@ namespace dbr {
 
 class PolicyService;
 
+// What a trainer works with. The three pointers are not owned and outlive the trainer.
 struct TrainerParts {
   std::unique_ptr<Algorithm> algorithm;
-  PolicyService* policy_service = nullptr;  // outlives the trainer, as the two below
+  PolicyService* policy_service = nullptr;
   MetricsSink* metrics = nullptr;
   Saver* saver = nullptr;
   std::unique_ptr<Prefetcher> prefetcher;
   std::unique_ptr<Relabeller> relabeller;
 };
 
-// Run() in one thread; Stop() from any.
+// Load, StartVersionsAfter and Run are for one thread, in this order; Stop may be called from any.
 class Trainer {
  public:
   Trainer(const LearnerConfig& config, TrainerParts parts);
 
-  // Continues from a checkpoint that Save() made.
+  // Continues from the state of a Checkpoint. DataLoss where a tensor or a counter is missing,
+  // InvalidArgument where a tensor has another size than the config's networks; the message names it.
   absl::Status Load(const TensorFile& file);
 
   // Versions will be greater than `version`: labels of a learner that went on after its last checkpoint, and
@@ -43,18 +45,20 @@ class Trainer {
   // a label it has.
   void StartVersionsAfter(std::uint64_t version) { snapshot_.version = std::max(snapshot_.version, version); }
 
-  // Publishes the first policy, then updates until stopped, an error, or max_updates; saves at the end. After
-  // max_updates it goes on serving until Stop. OK after Stop.
+  // Publishes the first policy, then updates until Stop, an error, or max_updates; saves at the end. After
+  // max_updates it goes on serving until Stop. Blocks until then. OK after Stop. Errors: the final error of
+  // the draws (Prefetcher), those of Algorithm::Update (nothing is saved after these: the state may be
+  // worthless), and those of the last save.
   absl::Status Run();
-  void Stop();
+  void Stop();  // ends the draws and wakes Run
 
   std::uint64_t updates() const { return updates_; }
 
  private:
   absl::Status UpdateOnce();
-  void Publish();
-  void Record();
-  void MaybeCheckpoint();
+  void Publish();          // offers the newest policy under the next version
+  void Record();           // writes a row of metrics
+  void MaybeCheckpoint();  // offers a checkpoint where the last one is old enough
   Checkpoint MakeCheckpoint();
   void SetStatus(bool finished);
 

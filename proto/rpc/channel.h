@@ -10,11 +10,13 @@
 
 namespace dbr {
 
-// A channel of its own connection to "unix:/path" or "host:port"; reconnects by itself within a second of the
-// server's return.
+// A channel to "unix:/path" or "host:port" with a connection that no other channel shares. It connects in the
+// background and reconnects by itself within a second of the server's return; a connection whose other end
+// has vanished is given up after the times of proto/rpc/keepalive.h. Replies may be of any size. Initializes
+// gRPC for the rest of the process.
 std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address);
 
-// Sets the deadline of a call.
+// Sets the deadline of a call to `timeout` from now.
 void SetDeadline(absl::Duration timeout, grpc::ClientContext* context);
 
 }  // namespace dbr

@@ -5,8 +5,9 @@
 
 namespace dbr {
 
-// Keeps the library initialized until the process ends. Without it the end of the last channel or server
-// shuts the library down, and that joins a thread of its own which may sit in a poll of ten seconds.
+// Initializes the library, once, until the process ends. Without it the end of the last channel or server
+// shuts the library down, which joins one of the library's threads, and that thread may sit in a poll of ten
+// seconds. Thread-safe.
 inline void KeepGrpcInitialized() {
   [[maybe_unused]] static const bool kept = (grpc_init(), true);
 }

@@ -1,5 +1,4 @@
-// How each of our programs serves gRPC: health, reflection, insecure addresses refused, an address in use
-// said.
+// How each of our programs serves gRPC.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -17,16 +16,17 @@ struct ServerOptions {
   bool allow_insecure = false;  // serve an address that other machines can reach, without authentication
 };
 
-// A running server; its address with the port that was picked.
+// A running server. The owner shuts it down before the services that it was started with are gone.
 struct RunningServer {
   std::unique_ptr<grpc::Server> server;
-  std::string address;
+  std::string address;  // as in the options, with the port that was picked
 };
 
 // Starts a server with the standard health and reflection services beside `services` (not owned, alive until
-// the server is gone). A stale unix socket that nobody serves is replaced. Errors: InvalidArgument for an
-// address that other machines can reach without allow_insecure, or a socket path that is too long;
-// AlreadyExists where it is in use.
+// the server is gone). Messages of up to 256 MiB are taken. A stale unix socket that nobody serves is
+// replaced; another file at its path is left alone. Errors: InvalidArgument for an address that is none, one
+// that other machines can reach without allow_insecure, a socket path that is too long or where another file
+// lies; AlreadyExists where the address is in use or cannot be opened.
 absl::StatusOr<RunningServer> StartServer(const ServerOptions& options,
                                           const std::vector<grpc::Service*>& services);
 

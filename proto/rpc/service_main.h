@@ -8,6 +8,7 @@
 
 namespace dbr {
 
+// What the flags say.
 struct ServiceArguments {
   std::string config_path;
   RunFolder folder;
@@ -16,8 +17,8 @@ struct ServiceArguments {
   bool allow_insecure = false;
 };
 
-// `app` fills `arguments`, which outlive it, while it parses. The two texts say for --help what lies in the
-// run folder and what --resume continues.
+// Declares the flags: `app` fills `arguments`, which outlive it, while it parses. The two texts say for
+// --help what lies in the run folder and what --resume continues.
 inline void AddServiceFlags(const std::string& folder_holds, const std::string& resumes,
                             ServiceArguments* arguments, CLI::App* app) {
   app->add_option("--config", arguments->config_path, "Text-format config")->required();
@@ -29,7 +30,7 @@ inline void AddServiceFlags(const std::string& folder_holds, const std::string& 
                 "Serve an address that other machines can reach");
 }
 
-// An address as the flag gives it, else as the config does, else the run folder's.
+// The address that the flag gives, else the config's, else the run folder's; empty means not given.
 inline std::string ChooseAddress(const std::string& flag, const std::string& configured,
                                  const std::string& otherwise) {
   if (!flag.empty()) return flag;

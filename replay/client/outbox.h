@@ -52,8 +52,9 @@ class Outbox {
   // The time from which Next has a message: the past where it has one now, the time when what there is will
   // be old, or the infinite future. `waited_for`: somebody waits for room or for the last acknowledgement.
   absl::Time NextTime(bool waited_for) const;
-  // The next message to send, or null where NextTime is later than `now`. It must not be changed; it may come
-  // again on another stream.
+  // The next message to send, or null where NextTime is later than `now`. The outbox and the caller share it:
+  // it must not be changed, and it may come again on another stream. A message without transitions asks for
+  // an acknowledgement alone.
   std::shared_ptr<const InsertRequest> Next(absl::Time now, bool waited_for);
 
   // Takes the server's word that it holds all up to a sequence number.
@@ -74,12 +75,12 @@ class Outbox {
 
   const OutboxOptions options_;
   const std::size_t messages_per_acknowledgement_;
-  std::shared_ptr<InsertRequest> filling_;
+  std::shared_ptr<InsertRequest> filling_;  // null before its first transition
   absl::Time filling_since_;
   std::deque<std::shared_ptr<InsertRequest>> sealed_;  // not acknowledged, in order
   std::vector<std::shared_ptr<InsertRequest>> spare_;  // to be filled again
-  std::size_t sent_ = 0;                               // of sealed_, on this stream
-  std::size_t sent_unasked_ = 0;                       // since the last that asks for an acknowledgement
+  std::size_t sent_ = 0;                               // how many of sealed_ are sent on this stream
+  std::size_t sent_unasked_ = 0;                       // how many since one that asks for acknowledgement
   absl::Time last_sent_;
   std::uint64_t appended_ = 0;
   std::uint64_t acknowledged_ = 0;
