@@ -18,7 +18,8 @@ namespace {
 
 constexpr char kThreads[] = "OPENBLAS_NUM_THREADS";
 constexpr char kKernel[] = "OPENBLAS_CORETYPE";
-// Fused multiply-add on halves of a vector: right where a processor splits vectors anyway.
+// This kernel multiplies and adds halves of a vector at once, which is right where a processor splits vectors
+// anyway.
 constexpr char kOtherKernel[] = "Excavator";
 
 // The least seconds of a few runs, for others may hold the core meanwhile.
@@ -31,14 +32,6 @@ double LeastSeconds(const Function& function) {
     least = std::min(least, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   }
   return least;
-}
-
-bool HasFusedMultiplyAdd() {
-#if defined(__x86_64__)
-  return __builtin_cpu_supports("fma") != 0;
-#else
-  return false;
-#endif
 }
 
 }  // namespace
@@ -76,11 +69,19 @@ bool SlowKernel() {
   return share > 1.3;
 }
 
+bool RunsOtherKernel() {
+#if defined(__x86_64__)
+  return __builtin_cpu_supports("fma4") != 0 || __builtin_cpu_is("znver1") != 0;
+#else
+  return false;
+#endif
+}
+
 void RestartWithBlasSetUp(char** argv) {
   const char* threads = std::getenv(kThreads);
   if (threads != nullptr && std::strcmp(threads, "1") == 0) return;
   UseOneBlasThread();  // also where the program cannot be executed again: at least no product uses them
-  if (HasFusedMultiplyAdd() && SlowKernel()) setenv(kKernel, kOtherKernel, /*overwrite=*/0);
+  if (RunsOtherKernel() && SlowKernel()) setenv(kKernel, kOtherKernel, /*overwrite=*/0);
   setenv(kThreads, "1", /*overwrite=*/1);
   // By its path, so that lists of processes show the program's name.
   std::error_code error;

@@ -9,9 +9,9 @@ void UseOneBlasThread();
 
 // Sets OpenBLAS up for a whole program and the programs that it starts. Belongs in the first line of main,
 // before signals are blocked: it executes the program again in the same process, with OPENBLAS_NUM_THREADS=1
-// and, where SlowKernel() says so, OPENBLAS_CORETYPE. OpenBLAS reads both while it is loaded and starts its
-// threads then, before main can block a signal: such a thread would take a SIGTERM and the program would die
-// without draining. Does nothing where OPENBLAS_NUM_THREADS is 1 already.
+// and, where RunsOtherKernel() and SlowKernel() say so, OPENBLAS_CORETYPE. OpenBLAS reads both while it is
+// loaded and starts its threads then, before main can block a signal: such a thread would take a SIGTERM and
+// the program would die without draining. Does nothing where OPENBLAS_NUM_THREADS is 1 already.
 void RestartWithBlasSetUp(char** argv);
 
 // A matrix product by a plain loop: c = a b, all column-major [kTrialSize x kTrialSize].
@@ -22,5 +22,9 @@ void PlainProduct(const float* a, const float* b, float* c);
 // loop: it then does not suit the processor. (OpenBLAS 0.3.21 on AMD's first Zen: 10 GFLOP/s, a plain loop
 // 20, and OpenBLAS's kernel for an older AMD processor 33.) Takes 2 ms, or 20 where the kernel is slow.
 bool SlowKernel();
+
+// True where the processor executes all instructions of the kernel that is taken in place of a slow one:
+// FMA4, which only AMD's processors have. Its first Zen executes them and does not say so.
+bool RunsOtherKernel();
 
 }  // namespace dbr
