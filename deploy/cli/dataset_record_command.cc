@@ -77,7 +77,7 @@ absl::StatusOr<std::shared_ptr<const PolicyNetworks>> MediumPolicy(const RecordF
       FindShippedFile(absl::StrCat("deploy/policies/", env.name, "_medium.safetensors"));
   if (path.ok()) return OpenPolicy(*path);
   return absl::NotFoundError(absl::StrCat(path.status().message(),
-                                          "; name a policy with --policy, or train one: dbr ",
+                                          ". Name a policy with --policy, or train one: dbr ",
                                           "launch deploy/configs/", env.name, "_medium.textproto"));
 }
 

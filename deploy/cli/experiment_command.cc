@@ -11,6 +11,7 @@
 #include "core/file_io.h"
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
+#include "deploy/cli/shipped_file.h"
 #include "deploy/experiment/cell.h"
 #include "deploy/experiment/check.h"
 #include "deploy/experiment/grid.h"
@@ -60,7 +61,8 @@ absl::Status WriteDescription(const Experiment& experiment, const Grid& grid) {
 }
 
 absl::StatusOr<int> RunExperiment(const ExperimentFlags& flags) {
-  ASSIGN_OR_RETURN(const Experiment experiment, LoadExperiment(flags.grid));
+  ASSIGN_OR_RETURN(const std::string path, FindShippedFile(flags.grid));
+  ASSIGN_OR_RETURN(const Experiment experiment, LoadExperiment(path));
   ASSIGN_OR_RETURN(Grid grid, MakeCheckedGrid(experiment, flags.cells));
   if (flags.dry_run) {
     PrintPlan(grid);

@@ -10,6 +10,7 @@
 #include "absl/time/clock.h"
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
+#include "deploy/cli/shipped_file.h"
 #include "deploy/launch/launch.h"
 #include "deploy/launch/run_plan.h"
 
@@ -24,6 +25,9 @@ struct LaunchFlags {
 absl::StatusOr<int> RunLaunch(const LaunchFlags& flags) {
   LaunchOptions options = flags.options;
   if (flags.seed.has_value()) options.overrides.push_back(absl::StrCat("seed=", *flags.seed));
+  if (!options.config.empty()) {
+    ASSIGN_OR_RETURN(options.config, FindShippedFile(options.config));
+  }
   ASSIGN_OR_RETURN(const std::string programs, ProgramsFolder());
   ASSIGN_OR_RETURN(RunPlan plan, PrepareRun(options, absl::Now()));
   ASSIGN_OR_RETURN(const std::unique_ptr<Launch> launch, Launch::Create(std::move(plan), programs, stdout));

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "core/rng.h"
-#include "deploy/cli/shipped_file.h"
 #include "envs/registry/registry.h"
 #include "nn/mlp.h"
 
@@ -136,13 +135,6 @@ TEST(RecorderTest, StopsWhenCancelledAndWhenTheSinkFails) {
   EXPECT_EQ(RecordEpisodes(options, sinks, cancelled).code(), absl::StatusCode::kCancelled);
   const std::atomic<bool> not_cancelled = false;
   EXPECT_EQ(RecordEpisodes(options, sinks, not_cancelled).code(), absl::StatusCode::kDataLoss);
-}
-
-TEST(ShippedFileTest, IsLookedForFromTheProgramUpwards) {
-  EXPECT_TRUE(FindShippedFile("deploy/configs/connect4.textproto").ok());
-  const absl::Status missing = FindShippedFile("deploy/configs/no_such.textproto").status();
-  EXPECT_EQ(missing.code(), absl::StatusCode::kNotFound);
-  EXPECT_THAT(std::string(missing.message()), HasSubstr("no_such.textproto"));
 }
 
 }  // namespace
