@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "absl/strings/str_join.h"
 #include "core/status_macros.h"
 #include "deploy/cli/algorithm_report.h"
 #include "deploy/cli/command_line.h"
@@ -32,14 +33,21 @@ absl::Status RunAlgorithms(const AlgorithmsFlags& flags) {
   return absl::OkStatus();
 }
 
+std::string AlgorithmNames() {
+  return absl::StrJoin(AllAlgorithms(), "|",
+                       [](std::string* out, const AlgorithmFacts& one) { *out += one.name; });
+}
+
 }  // namespace
 
 void AddAlgorithms(CLI::App* app, int* exit_code) {
   auto flags = std::make_shared<AlgorithmsFlags>();
   CLI::App* command =
       app->add_subcommand("algorithms", "List the algorithms, or show how one of them is set");
-  command->add_option("NAME", flags->name,
-                      "One algorithm: its whole config message, with defaults and bounds");
+  command
+      ->add_option("NAME", flags->name,
+                   "Show one algorithm: its whole config message, with defaults and bounds")
+      ->type_name(AlgorithmNames());
   command->add_flag("--json", flags->json,
                     "Print one JSON object {name, actions, source, variants, fields}, or a list of all");
   command->footer(

@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 
 namespace dbr {
@@ -18,13 +17,6 @@ absl::StatusOr<std::string> ProgramsFolder() {
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
   if (error) return absl::InternalError(absl::StrCat("cannot read /proc/self/exe: ", error.message()));
   return self.parent_path().string();
-}
-
-absl::StatusOr<ActingMode> ParseActingMode(const std::string& name) {
-  ActingMode mode;
-  if (ActingMode_Parse(absl::AsciiStrToUpper(name), &mode)) return mode;
-  return absl::InvalidArgumentError(
-      absl::StrCat("--mode: expected sample, mode, greedy_q or support, found '", name, "'"));
 }
 
 }  // namespace dbr

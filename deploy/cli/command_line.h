@@ -6,7 +6,6 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
-#include "nn/policy.h"
 
 namespace CLI {
 class App;
@@ -14,8 +13,8 @@ class App;
 
 namespace dbr {
 
-// Each adds its subcommand to `app`; the subcommand runs while the command line is parsed and leaves its exit
-// status in `exit_code`.
+// Each adds one subcommand to `app`. The subcommand runs while `app` parses the command line, and leaves its
+// exit status in `exit_code`, which must outlive `app`: 0 for success, Fail's for an error, 130 after Ctrl-C.
 void AddLaunch(CLI::App* app, int* exit_code);
 void AddStats(CLI::App* app, int* exit_code);
 void AddEvaluate(CLI::App* app, int* exit_code);
@@ -25,14 +24,12 @@ void AddExperiment(CLI::App* app, int* exit_code);
 void AddReport(CLI::App* app, int* exit_code);
 void AddAlgorithms(CLI::App* app, int* exit_code);
 
-// Prints "dbr COMMAND: MESSAGE" to stderr; 2 for what the user typed or wrote (InvalidArgument), 1 for the
-// rest.
+// Prints "dbr COMMAND: MESSAGE" to stderr and gives the exit status: 2 where the user typed or wrote
+// something wrong (InvalidArgument), else 1.
 int Fail(absl::string_view command, const absl::Status& status);
 
-// The folder of this program: the service programs stand beside it.
+// The folder of this program, in which the service programs stand as well: bin of the build folder or of the
+// prefix that dbr is installed in. Internal where the system does not say it.
 absl::StatusOr<std::string> ProgramsFolder();
-
-// "sample", "mode", "greedy_q" or "support", in any case.
-absl::StatusOr<ActingMode> ParseActingMode(const std::string& name);
 
 }  // namespace dbr

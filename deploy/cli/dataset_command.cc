@@ -11,6 +11,7 @@
 #include "absl/time/clock.h"
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
+#include "deploy/cli/common_options.h"
 #include "deploy/terminal/progress_bar.h"
 #include "deploy/terminal/terminal.h"
 #include "replay/dataset/dataset_copy.h"
@@ -79,12 +80,11 @@ absl::StatusOr<int> RunConvert(const ConvertFlags& flags) {
 void AddInfo(CLI::App* dataset, int* exit_code) {
   auto flags = std::make_shared<InfoFlags>();
   CLI::App* command =
-      dataset->add_subcommand("info", "Say what a file holds: rows, episodes, returns, bad values");
-  command->add_option("FILE", flags->path, "HDF5 file")->required();
+      dataset->add_subcommand("info", "Show what a file holds: rows, episodes, returns, bad values");
+  command->add_option("FILE", flags->path, "HDF5 file")->required()->type_name("FILE");
   command
-      ->add_option("--layout", flags->layout,
-                   "d4rl, d4rl_pybullet or minari [as the file's own attribute says; never guessed]")
-      ->type_name("NAME");
+      ->add_option("--layout", flags->layout, "Layout of the file [as its own attribute says; never guessed]")
+      ->type_name(kLayoutNames);
   command->add_flag(
       "--json", flags->json,
       "Print one JSON object: {layout, rows, transitions, episodes, terminals, timeouts, non_finite, "
@@ -99,15 +99,15 @@ void AddInfo(CLI::App* dataset, int* exit_code) {
 void AddConvert(CLI::App* dataset, int* exit_code) {
   auto flags = std::make_shared<ConvertFlags>();
   CLI::App* command = dataset->add_subcommand("convert", "Write a file's transitions in another layout");
-  command->add_option("IN", flags->in, "HDF5 file")->required();
-  command
-      ->add_option("--layout", flags->from,
-                   "Layout of IN: d4rl, d4rl_pybullet or minari [as its own attribute says]")
-      ->type_name("NAME");
-  command->add_option("--to", flags->to, "Layout of FILE: d4rl or d4rl_pybullet")
+  command->add_option("IN", flags->in, "HDF5 file")->required()->type_name("FILE");
+  command->add_option("--layout", flags->from, "Layout of IN [as its own attribute says; never guessed]")
+      ->type_name(kLayoutNames);
+  command->add_option("--to", flags->to, "Layout of the file to write")
       ->required()
-      ->type_name("NAME");
-  command->add_option("--out", flags->out, "The file to write; replaced when the new one is whole")
+      ->type_name(kWrittenLayoutNames);
+  command
+      ->add_option("--out", flags->out,
+                   "The HDF5 file to write; an old one is replaced when the new one is whole")
       ->required()
       ->type_name("FILE");
   command->add_flag("--skip-bad-rows", flags->skip_bad_rows,

@@ -15,14 +15,16 @@ class App;
 
 namespace dbr {
 
-// Adds `record` to `dataset`, as the functions of command_line.h do.
+// Adds `record` to the command `dataset`, as the functions of command_line.h add to the program.
 void AddDatasetRecord(CLI::App* dataset, int* exit_code);
 
-// An option's value; empty for "". InvalidArgument, naming the option.
+// The layout that `name`, the value of `option`, stands for; none for "". InvalidArgument, naming the option.
 absl::StatusOr<std::optional<DatasetLayout>> ParseLayoutOption(const std::string& option,
                                                                const std::string& name);
 
-// Reads the whole file, rows that are not finite counted and left out. Cancelled after the user's interrupt.
+// Reads the whole file and reports on it; rows with values that are not finite are counted and left out.
+// `layout`: none takes the file's own word. Blocks. Errors: DatasetReader::Open's and Next's, naming the
+// file; Cancelled after the user's interrupt.
 absl::StatusOr<DatasetReport> ReportDataset(const std::string& path, std::optional<DatasetLayout> layout,
                                             const Interrupt& interrupt);
 

@@ -11,6 +11,7 @@
 #include "absl/time/clock.h"
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
+#include "deploy/cli/common_options.h"
 #include "deploy/cli/dataset_command.h"
 #include "deploy/cli/shipped_file.h"
 #include "deploy/launch/run_access.h"
@@ -72,7 +73,7 @@ std::unique_ptr<ProgressBar> MakeBar(const RecordFlags& flags, const EnvSpec& en
 
 absl::StatusOr<std::shared_ptr<const PolicyNetworks>> MediumPolicy(const RecordFlags& flags,
                                                                    const EnvSpec& env) {
-  if (!flags.policy.empty()) return OpenPolicy(flags.policy);
+  if (!flags.policy.empty()) return OpenNamedPolicy(flags.policy);
   const absl::StatusOr<std::string> path =
       FindShippedFile(absl::StrCat("deploy/policies/", env.name, "_medium.safetensors"));
   if (path.ok()) return OpenPolicy(*path);
@@ -171,9 +172,7 @@ absl::StatusOr<int> RunRecord(const RecordFlags& flags) {
 void AddDatasetRecord(CLI::App* dataset, int* exit_code) {
   auto flags = std::make_shared<RecordFlags>();
   CLI::App* command = dataset->add_subcommand("record", "Record a robot's steps on every core");
-  command->add_option("--env", flags->env, "hopper, walker2d, half_cheetah or ant")
-      ->required()
-      ->type_name("NAME");
+  command->add_option("--env", flags->env, "The robot to record")->required()->type_name(kRobotNames);
   command
       ->add_option(
           "--quality", flags->quality,
@@ -184,15 +183,16 @@ void AddDatasetRecord(CLI::App* dataset, int* exit_code) {
       ->add_option("--steps", flags->steps, "Transitions to record [mixed: all that the run's store holds]")
       ->check(CLI::Range(std::int64_t{1}, kMaxSteps))
       ->type_name("N");
-  command->add_option("--out", flags->out, "The HDF5 file to write; replaced when the new one is whole")
+  command
+      ->add_option("--out", flags->out,
+                   "The HDF5 file to write; an old one is replaced when the new one is whole")
       ->required()
       ->type_name("FILE");
-  command->add_option("--seed", flags->seed, "The same seed records the same steps, on any number of cores")
+  AddSeedOption(command, "Random seed: the same one records the same steps, on any number of cores",
+                &flags->seed);
+  command->add_option("--layout", flags->layout, "Layout of the file")
       ->capture_default_str()
-      ->type_name("N");
-  command->add_option("--layout", flags->layout, "d4rl or d4rl_pybullet")
-      ->capture_default_str()
-      ->type_name("NAME");
+      ->type_name(kWrittenLayoutNames);
   command
       ->add_option("--policy", flags->policy,
                    "medium: a policy file or a run folder [deploy/policies/ENV_medium.safetensors]")

@@ -10,16 +10,17 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "absl/strings/str_replace.h"
 #include "actor/evaluation_loop.h"
 #include "actor/evaluator.h"
 #include "actor/policy_fit.h"
 #include "core/rng.h"
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
+#include "deploy/cli/common_options.h"
 #include "deploy/film/film.h"
 #include "deploy/launch/result_tables.h"
 #include "deploy/launch/results.h"
-#include "deploy/launch/run_access.h"
 #include "deploy/process/interrupt.h"
 #include "deploy/terminal/terminal.h"
 #include "envs/env.h"
@@ -39,13 +40,15 @@ struct EvaluateFlags {
   std::string film;
 };
 
-// The opponents of the environments that have any, for people.
-std::string KnownOpponents() {
+// The opponents of the environments that have any, as choices: "random, one_ply or mcts:N" reads as
+// random|one_ply|mcts:N.
+std::string OpponentNames() {
   std::vector<std::string> known;
   for (const std::string& env : EnvNames()) {
-    if (!PresentationOf(env).opponents.empty()) known.push_back(PresentationOf(env).opponents);
+    const std::string& opponents = PresentationOf(env).opponents;
+    if (!opponents.empty()) known.push_back(absl::StrReplaceAll(opponents, {{", ", "|"}, {" or ", "|"}}));
   }
-  return absl::StrJoin(known, "; ");
+  return absl::StrJoin(known, "|");
 }
 
 // Films the first episode of the evaluation with that seed.
@@ -75,7 +78,7 @@ absl::StatusOr<int> RunFilm(const EvaluateFlags& flags, const PolicyNetworks& po
 
 absl::StatusOr<int> RunEvaluate(const EvaluateFlags& flags) {
   ASSIGN_OR_RETURN(const ActingMode mode, ParseActingMode(flags.mode));
-  ASSIGN_OR_RETURN(const std::shared_ptr<const PolicyNetworks> policy, OpenPolicy(flags.policy));
+  ASSIGN_OR_RETURN(const std::shared_ptr<const PolicyNetworks> policy, OpenNamedPolicy(flags.policy));
   if (!flags.film.empty()) return RunFilm(flags, *policy, mode);
   std::vector<std::string> opponents = {flags.opponent};
   if (flags.opponent.empty()) opponents = OpponentsToEvaluate(policy->spec().env, {});
@@ -102,31 +105,27 @@ absl::StatusOr<int> RunEvaluate(const EvaluateFlags& flags) {
 
 void AddEvaluate(CLI::App* app, int* exit_code) {
   auto flags = std::make_shared<EvaluateFlags>();
-  CLI::App* command =
-      app->add_subcommand("evaluate", "Play games with a policy and give its score with the standard error");
-  command->add_option("--policy", flags->policy, "A policy file, or a run folder for its newest one")
-      ->required()
-      ->type_name("FILE_OR_RUN");
+  CLI::App* command = app->add_subcommand(
+      "evaluate",
+      "Play episodes with a policy and print its mean score and return with their standard errors");
+  AddPolicyOption(command, &flags->policy);
   command
-      ->add_option(
-          "--opponent", flags->opponent,
-          absl::StrCat(KnownOpponents(), " [all that the environment has; with --json the first of them]"))
-      ->type_name("NAME");
+      ->add_option("--opponent", flags->opponent,
+                   "The player that it meets [all that the environment has; with --json the first of them]")
+      ->type_name(OpponentNames());
   command
-      ->add_option("--episodes", flags->episodes, "Games against each opponent, every second one begun by it")
+      ->add_option("--episodes", flags->episodes,
+                   "Episodes to play; against an opponent, games, of which it begins every second one")
       ->capture_default_str()
-      ->check(CLI::Range(1, 1 << 20));
-  command->add_option("--seed", flags->seed, "The same seed plays the same games")
-      ->capture_default_str()
+      ->check(CLI::Range(1, 1 << 20))
       ->type_name("N");
-  command->add_option("--mode", flags->mode, "How the policy acts: sample, mode, greedy_q or support")
-      ->capture_default_str()
-      ->type_name("MODE");
+  AddSeedOption(command, "Random seed: the same one plays the same games", &flags->seed);
+  AddModeOption(command, "How the policy acts", &flags->mode);
   command->add_flag("--json", flags->json,
                     "Print one JSON object: {env, opponent, episodes, seed, score, return}");
   command
       ->add_option("--film", flags->film,
-                   "Instead of playing many episodes, draw the first into this animated WebP file")
+                   "Play one episode of a robot alone, and film it into this animated WebP file")
       ->type_name("FILE")
       ->excludes("--json");
   command->footer(

@@ -76,10 +76,12 @@ absl::StatusOr<int> RunExperiment(const ExperimentFlags& flags) {
 }
 
 void AddChoices(CLI::App* command, ExperimentFlags* flags) {
-  command->add_option("GRID", flags->grid, "The grid: a file of proto/experiment.proto")->required();
+  command->add_option("GRID", flags->grid, "The grid: a text file of the message Experiment")
+      ->required()
+      ->type_name("FILE");
   command
       ->add_option("--only", flags->cells.only,
-                   "Only cells that a glob matches, by TASK, CONTENDER, TASK/CONTENDER or "
+                   "Run only the cells that a glob matches by TASK, CONTENDER, TASK/CONTENDER or "
                    "TASK/CONTENDER/seed-N; may be repeated")
       ->type_name("GLOB")
       ->expected(1)
@@ -103,12 +105,12 @@ void AddWays(CLI::App* command, ExperimentFlags* flags) {
   command->add_option("--data", flags->cells.data, "Folder of the seed buffers that the grid names")
       ->capture_default_str()
       ->type_name("DIR");
-  command->add_flag("--dry-run", flags->dry_run, "Say what would be run, and run nothing");
+  command->add_flag("--dry-run", flags->dry_run, "Print what would be run, and run nothing");
   command->add_flag("--keep-stores", flags->run.keep_stores,
                     "Keep the replay store and the checkpoints of cells that are done");
-  command->add_flag(
-      "--overwrite-changed", flags->run.overwrite_changed,
-      "Move runs of another config to RUN_DIR/aside and start them anew; else they are left alone");
+  command->add_flag("--overwrite-changed", flags->run.overwrite_changed,
+                    "Move runs that have another config to RUN_DIR/aside and start them anew, instead of "
+                    "leaving them alone");
 }
 
 }  // namespace
@@ -116,16 +118,15 @@ void AddWays(CLI::App* command, ExperimentFlags* flags) {
 void AddExperiment(CLI::App* app, int* exit_code) {
   auto flags = std::make_shared<ExperimentFlags>();
   CLI::App* command = app->add_subcommand(
-      "experiment", "Run a grid of tasks x algorithms x seeds, and go on with one that was stopped");
+      "experiment", "Run a grid of tasks x algorithms x seeds, or go on with one that was stopped");
   AddChoices(command, flags.get());
   AddWays(command, flags.get());
   command->footer(
-      "Each cell is an ordinary run in RUN_DIR/TASK/CONTENDER/seed-N, with the log of its launches and its "
-      "config "
-      "beside it.\n"
-      "Ctrl-C saves and stops; the same command goes on. What is done is not run again.\n"
-      "Exit status: 0 all done, 1 a cell failed or was left alone, 2 a bad grid or flag, 130 after Ctrl-C or "
-      "SIGTERM.\n\n"
+      "Each cell is an ordinary run in RUN_DIR/TASK/CONTENDER/seed-N, with its config and the log of its\n"
+      "launches beside it. Ctrl-C saves and stops; the same command goes on. A cell that is done is not run\n"
+      "again.\n"
+      "Exit status: 0 when all cells are done, 1 when one failed or was left alone, 2 for a bad grid or\n"
+      "flag, 130 after Ctrl-C or SIGTERM.\n\n"
       "Examples:\n"
       "  dbr experiment deploy/experiments/paper.textproto --scale smoke --dry-run\n"
       "  dbr experiment deploy/experiments/paper.textproto --scale short --only 'hopper-*/dbr' --seeds 2");

@@ -10,6 +10,7 @@
 #include "absl/time/clock.h"
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
+#include "deploy/cli/common_options.h"
 #include "deploy/cli/shipped_file.h"
 #include "deploy/launch/launch.h"
 #include "deploy/launch/run_plan.h"
@@ -40,34 +41,33 @@ void AddLaunch(CLI::App* app, int* exit_code) {
   auto flags = std::make_shared<LaunchFlags>();
   CLI::App* command = app->add_subcommand(
       "launch", "Train: start replay, learner, actors and evaluator, and watch over them");
-  command->add_option("CONFIG", flags->options.config,
-                      "Config file; with --resume the run folder's own by default");
   command
-      ->add_option("--set", flags->options.overrides,
-                   "Override a field of the config: path=value; may be repeated")
+      ->add_option("CONFIG", flags->options.config, "Config file [with --resume: the one of the run folder]")
+      ->type_name("FILE");
+  command->add_option("--set", flags->options.overrides, "Override a field of the config; may be repeated")
       ->type_name("PATH=VALUE")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command->add_option("--seed", flags->seed, "Short for --set seed=N")->type_name("N");
+  command->add_option("--seed", flags->seed, "Random seed: short for --set seed=N")->type_name("N");
   command->add_option("--run-dir", flags->options.run_dir, "Folder of the run [runs/ENV-ALGORITHM-DATE-TIME]")
       ->type_name("DIR");
   command->add_flag("--resume", flags->options.resume, "Continue the run in --run-dir");
   command
       ->add_option("--seed-buffer", flags->options.seed_buffer,
-                   "HDF5 file of offline data that the replay server begins with (replay.seed_buffer.path)")
+                   "HDF5 file of offline data that the replay server begins with: replay.seed_buffer.path")
       ->type_name("FILE");
   command
       ->add_option("--seed-layout", flags->options.seed_layout,
-                   "Its layout where the file does not say it: d4rl, d4rl_pybullet or minari")
-      ->type_name("NAME");
+                   "Layout of the seed buffer [as its own attribute says; never guessed]")
+      ->type_name(kLayoutNames);
   command->add_flag("--skip-bad-rows", flags->options.skip_bad_rows,
-                    "Leave out its rows with values that are not finite");
+                    "Leave out rows of the seed buffer with values that are not finite");
   command->footer(
-      "Ends at launch.max_seconds, max_episodes, max_steps or stop_at_return or learner.max_updates of the "
-      "config, or on\n"
-      "Ctrl-C; everything is saved first. A second Ctrl-C kills the process that is being waited for.\n"
-      "Exit status: 0 after a limit, 130 after Ctrl-C or SIGTERM, 2 for a bad config or flag, 1 for other "
-      "failures.\n\n"
+      "The run ends when it reaches launch.max_seconds, launch.max_episodes, launch.max_steps,\n"
+      "launch.stop_at_return or learner.max_updates of the config, or on Ctrl-C; everything is saved first.\n"
+      "A second Ctrl-C kills the process that is being waited for.\n"
+      "Exit status: 0 after a limit, 1 for a failure, 2 for a bad config or flag,\n"
+      "130 after Ctrl-C or SIGTERM.\n\n"
       "Examples:\n"
       "  dbr launch deploy/configs/connect4.textproto\n"
       "  dbr launch deploy/configs/connect4.textproto --set launch.max_seconds=60 --set "

@@ -13,9 +13,12 @@ int Main(int argc, char** argv) {
   CLI::App app("Dual Behavior Regularized reinforcement learning: trains, watches and examines policies.",
                "dbr");
   app.require_subcommand(1);
-  app.footer("Each command has its own --help. Start with: dbr launch deploy/configs/connect4.textproto");
+  app.footer(
+      "Each command has its own --help. The files deploy/... of the examples come with dbr, wherever it is\n"
+      "installed; where the working folder has a file of that name, that one is taken.\n\n"
+      "Example: dbr launch deploy/configs/connect4.textproto");
   app.set_version_flag("--version", absl::StrCat("dbr ", DBR_VERSION, ", commit ", dbr::BuildCommit()),
-                       "Say which version this is");
+                       "Print the version and the commit that dbr was built from");
   int exit_code = 0;
   dbr::AddLaunch(&app, &exit_code);
   dbr::AddStats(&app, &exit_code);

@@ -10,7 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
-#include "deploy/launch/run_access.h"
+#include "deploy/cli/common_options.h"
 #include "deploy/probe/positions_file.h"
 #include "deploy/probe/probe.h"
 #include "deploy/probe/probe_report.h"
@@ -66,7 +66,7 @@ absl::Status RunProbe(const ProbeFlags& flags) {
     return absl::InvalidArgumentError("expected one of --positions FILE and --moves COLUMNS");
   }
   ASSIGN_OR_RETURN(const ActingMode mode, ParseActingMode(flags.mode));
-  ASSIGN_OR_RETURN(const std::shared_ptr<const PolicyNetworks> policy, OpenPolicy(flags.policy));
+  ASSIGN_OR_RETURN(const std::shared_ptr<const PolicyNetworks> policy, OpenNamedPolicy(flags.policy));
   return flags.moves.has_value() ? ProbeMoves(flags, *policy, mode) : ProbeFile(flags, *policy, mode);
 }
 
@@ -76,23 +76,21 @@ void AddProbe(CLI::App* app, int* exit_code) {
   auto flags = std::make_shared<ProbeFlags>();
   CLI::App* command =
       app->add_subcommand("probe", "Show what a Connect-4 policy thinks of positions, and how much is right");
-  command->add_option("--policy", flags->policy, "A policy file, or a run folder for its newest one")
-      ->required()
-      ->type_name("FILE_OR_RUN");
+  AddPolicyOption(command, &flags->policy);
   command
       ->add_option("--positions", flags->positions,
-                   "Positions with their exact values (tests/reference/connect4)")
+                   "JSON file of positions with their exact values, as in tests/reference/connect4")
       ->type_name("FILE");
-  command->add_option("--moves", flags->moves, "One position: the columns 1 to 7 played from the empty board")
+  command
+      ->add_option("--moves", flags->moves,
+                   "One position: the columns, 1 to 7, that were played from the empty board on")
       ->type_name("COLUMNS");
-  command->add_option("--mode", flags->mode, "Whose move is judged: sample, mode, greedy_q or support")
-      ->capture_default_str()
-      ->type_name("MODE");
-  command->add_option("--seed", flags->seed, "Of the mode sample")->capture_default_str()->type_name("N");
-  command->add_flag(
-      "--json", flags->json,
-      "Print one JSON object: with a file {positions, must_block, must_win, keeps_value_decisive, best}, "
-      "with moves {moves, to_move, move, pi, beta_plus, beta_minus, beta, q}");
+  AddModeOption(command, "How the policy chooses the move that is judged", &flags->mode);
+  AddSeedOption(command, "Random seed, for the mode sample", &flags->seed);
+  command->add_flag("--json", flags->json,
+                    "Print one JSON object: with --positions {positions, must_block, must_win, "
+                    "keeps_value_decisive, best}, "
+                    "with --moves {moves, to_move, move, pi, beta_plus, beta_minus, beta, q}");
   command->footer(
       "Examples:\n"
       "  dbr probe --policy runs/quickstart --moves 44536\n"

@@ -25,18 +25,21 @@ absl::StatusOr<int> RunReport(const report::ReportOptions& options) {
 void AddReport(CLI::App* app, int* exit_code) {
   auto options = std::make_shared<report::ReportOptions>();
   CLI::App* command = app->add_subcommand(
-      "report", "Tell what the runs of an experiment came to: tables, plots, and every cell");
+      "report", "Write a report on the runs of an experiment: tables, plots and every cell");
   command->add_option("RUNS", options->runs, "Folders that dbr experiment made, or copies of them")
-      ->required();
-  command->add_option("--out", options->out, "Folder for report.md, report.html and plots; made if need be")
       ->required()
       ->type_name("DIR");
-  command->add_option("--grid", options->grid, "The grid [RUNS/experiment.textproto]")->type_name("FILE");
+  command
+      ->add_option("--out", options->out,
+                   "Folder for report.md, report.html and the plots; it is made if it does not exist")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--grid", options->grid, "The grid of the experiment [RUNS/experiment.textproto]")
+      ->type_name("FILE");
   command->footer(
-      "report.html stands alone. Cells that are running, failed or not run are shown as such. A copy of a "
-      "run's folder "
-      "with\nsummary.json and config.textproto in it is enough; the board's bars also need "
-      "policy/latest.safetensors.\n\n"
+      "report.html needs no other file. Cells that are running, that failed or that were not run are shown\n"
+      "as such. A copy of a run's folder is enough if it has summary.json and config.textproto, and for the\n"
+      "bars of the Connect-4 board also policy/latest.safetensors.\n\n"
       "Example: dbr report runs/paper --out runs/paper/report");
   command->callback([options, exit_code] {
     const absl::StatusOr<int> result = RunReport(*options);

@@ -61,12 +61,14 @@ void AddStats(CLI::App* app, int* exit_code) {
   auto flags = std::make_shared<StatsFlags>();
   CLI::App* command =
       app->add_subcommand("stats", "Show the state of a replay server: partitions, rates, labels, clients");
-  command->add_option("--replay", flags->replay, "unix:PATH or HOST:PORT, or a run folder")
+  command
+      ->add_option("--replay", flags->replay,
+                   "Address of the server, unix:PATH or HOST:PORT, or its run folder")
       ->required()
-      ->type_name("ADDRESS");
+      ->type_name("ADDRESS_OR_RUN");
   command->add_flag("--json", flags->json,
-                    "Print one JSON object (with --watch one a second, each in a line)");
-  command->add_flag("--watch", flags->watch, "Again every second, until Ctrl-C");
+                    "Print one JSON object; with --watch, one a second, each on a line of its own");
+  command->add_flag("--watch", flags->watch, "Ask again every second, until Ctrl-C");
   command->footer(
       "Examples:\n"
       "  dbr stats --replay runs/quickstart --watch\n"
