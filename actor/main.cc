@@ -10,6 +10,7 @@
 #include "actor/actor.h"
 #include "core/run_folder.h"
 #include "core/shutdown.h"
+#include "deploy/manual/man_page.h"
 #include "nn/blas_setup.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/service_main.h"
@@ -29,21 +30,27 @@ struct Flags {
 };
 
 void Declare(CLI::App* app, Flags* flags) {
-  app->add_option("--config", flags->config, "Configuration (text format)")->required();
-  app->add_option("--run-dir", flags->run_dir, "Folder of the run")->required();
-  app->add_option("--index", flags->index, "Number of this actor among its like")->check(CLI::Range(0, 1023));
+  app->add_option("--config", flags->config, "Config file")->required()->type_name("FILE");
+  app->add_option("--run-dir", flags->run_dir, "Folder of the run")->required()->type_name("DIR");
+  app->add_option("--index", flags->index, "Number of this actor among the actors of the run")
+      ->check(CLI::Range(0, 1023))
+      ->type_name("N");
   app->add_option("--processes", flags->processes,
-                  "Actors of the run, for what they do together (default: the config's, or 1)")
-      ->check(CLI::Range(0, 1024));
+                  "How many actors the run has, for what they do together [as the config says, or 1]")
+      ->check(CLI::Range(0, 1024))
+      ->type_name("N");
   app->add_option("--replay", flags->replay,
-                  "Replay server (default: the config's, else the run folder's socket)");
+                  "Address of the replay server [the config's, else the socket in the run folder]")
+      ->type_name("ADDRESS");
   app->add_option("--learner", flags->learner,
-                  "Learner (default: the config's, else the run folder's socket)");
+                  "Address of the learner [the config's, else the socket in the run folder]")
+      ->type_name("ADDRESS");
   app->add_flag("--evaluate", flags->evaluate, "Be the evaluator: play evaluation episodes, insert nothing");
-  app->add_flag(
-      "--resume", flags->resume,
-      "The evaluator: go on for another one in the middle of a run, whose iterations it leaves alone");
-  app->footer("Example: dbr-actor --config deploy/configs/connect4.textproto --run-dir runs/first --index 0");
+  app->add_flag("--resume", flags->resume,
+                "With --evaluate: take over in the middle of a run, and leave alone the iterations that an "
+                "earlier evaluator saw");
+  AddManPagesOption(app);
+  app->footer("Example: dbr-actor --config my.textproto --run-dir runs/mine --index 0");
 }
 
 int Fail(const absl::Status& status, int exit_code) {
@@ -64,7 +71,8 @@ int Main(int argc, char** argv) {
   Flags flags;
   CLI::App app(
       "Acts in many environments by the learner's newest policy and writes transitions to the replay "
-      "server.");
+      "server.",
+      "dbr-actor");
   Declare(&app, &flags);
   try {
     app.parse(argc, argv);

@@ -23,6 +23,7 @@ void AddDataset(CLI::App* app, int* exit_code);
 void AddExperiment(CLI::App* app, int* exit_code);
 void AddReport(CLI::App* app, int* exit_code);
 void AddAlgorithms(CLI::App* app, int* exit_code);
+void AddCompletion(CLI::App* app, int* exit_code);
 
 // Prints "dbr COMMAND: MESSAGE" to stderr and gives the exit status: 2 where the user typed or wrote
 // something wrong (InvalidArgument), else 1.

@@ -5,6 +5,7 @@
 #include "core/shutdown.h"
 #include "deploy/cli/command_line.h"
 #include "deploy/launch/commit.h"
+#include "deploy/manual/man_page.h"
 #include "nn/blas_setup.h"
 
 namespace {
@@ -28,6 +29,8 @@ int Main(int argc, char** argv) {
   dbr::AddExperiment(&app, &exit_code);
   dbr::AddReport(&app, &exit_code);
   dbr::AddAlgorithms(&app, &exit_code);
+  dbr::AddCompletion(&app, &exit_code);
+  dbr::AddManPagesOption(&app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

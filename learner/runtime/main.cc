@@ -12,6 +12,7 @@
 #include "core/run_folder.h"
 #include "core/shutdown.h"
 #include "core/status_macros.h"
+#include "deploy/manual/man_page.h"
 #include "envs/env.h"
 #include "envs/registry/registry.h"
 #include "learner/algorithms/registry.h"
@@ -143,8 +144,10 @@ int Main(int argc, char** argv) {
   AddServiceFlags("Folder of the run: checkpoints, policy, metrics",
                   "Continue from the newest checkpoint of the run folder", &arguments, &app);
   app.add_option("--replay", arguments.replay_address,
-                 "Address of the replay server (default: the config's, else in the run folder)");
-  app.footer("Example: dbr-learner --config deploy/configs/connect4.textproto --run-dir runs/mine");
+                 "Address of the replay server [the config's, else the socket in the run folder]")
+      ->type_name("ADDRESS");
+  AddManPagesOption(&app);
+  app.footer("Example: dbr-learner --config my.textproto --run-dir runs/mine");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

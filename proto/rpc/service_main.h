@@ -21,10 +21,11 @@ struct ServiceArguments {
 // --help what lies in the run folder and what --resume continues.
 inline void AddServiceFlags(const std::string& folder_holds, const std::string& resumes,
                             ServiceArguments* arguments, CLI::App* app) {
-  app->add_option("--config", arguments->config_path, "Text-format config")->required();
-  app->add_option("--run-dir", arguments->folder.root, folder_holds)->required();
+  app->add_option("--config", arguments->config_path, "Config file")->required()->type_name("FILE");
+  app->add_option("--run-dir", arguments->folder.root, folder_holds)->required()->type_name("DIR");
   app->add_option("--address", arguments->address,
-                  "Address to serve on (default: the config's, else a unix socket in the run folder)");
+                  "Address to serve on [the config's, else a unix socket in the run folder]")
+      ->type_name("ADDRESS");
   app->add_flag("--resume", arguments->resume, resumes);
   app->add_flag("--allow-insecure", arguments->allow_insecure,
                 "Serve an address that other machines can reach");

@@ -10,6 +10,7 @@
 #include "core/run_folder.h"
 #include "core/shutdown.h"
 #include "core/status_macros.h"
+#include "deploy/manual/man_page.h"
 #include "envs/env.h"
 #include "envs/registry/registry.h"
 #include "proto/config/config_file.h"
@@ -69,7 +70,8 @@ int Main(int argc, char** argv) {
   ServiceArguments arguments;
   AddServiceFlags("Folder of the run, where the store lies", "Continue the store that the run folder has",
                   &arguments, &app);
-  app.footer("Example: dbr-replay --config deploy/configs/connect4.textproto --run-dir runs/mine");
+  AddManPagesOption(&app);
+  app.footer("Example: dbr-replay --config my.textproto --run-dir runs/mine");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -14,7 +14,6 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
-#include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "core/check.h"
 #include "core/file_io.h"
@@ -35,7 +34,7 @@ DbrProcess::DbrProcess(const std::string& program, std::vector<std::string> argu
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
-  arguments.insert(arguments.begin(), absl::StrCat(DBR_BIN_DIR, "/", program));
+  arguments.insert(arguments.begin(), std::filesystem::path(DBR_BIN_DIR) / program);
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);

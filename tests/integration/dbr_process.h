@@ -14,8 +14,8 @@ namespace dbr {
 // The longest wait. It is reached only where a test fails.
 inline constexpr absl::Duration kPatience = absl::Minutes(5);
 
-// A program of build/bin. The test reads its stdout and stderr. The destructor kills it. One thread at a
-// time.
+// A program of build/bin, or one at an absolute path. The test reads its stdout and stderr. The destructor
+// kills it. One thread at a time.
 class DbrProcess {
  public:
   DbrProcess(const std::string& program, std::vector<std::string> arguments);
