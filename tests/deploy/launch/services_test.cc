@@ -8,7 +8,7 @@
 #include "absl/synchronization/notification.h"
 #include "core/file_io.h"
 #include "core/run_folder.h"
-#include "deploy/cli/command_line.h"
+#include "deploy/cli/common_options.h"
 #include "deploy/launch/health.h"
 #include "deploy/launch/monitor.h"
 #include "deploy/launch/run_access.h"
