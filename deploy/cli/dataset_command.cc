@@ -20,7 +20,6 @@ namespace dbr {
 namespace {
 
 constexpr int kChunk = 8192;  // transitions
-constexpr absl::Duration kProgressEvery = absl::Seconds(10);
 
 struct InfoFlags {
   std::string path;

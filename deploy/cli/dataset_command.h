@@ -5,6 +5,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "absl/time/time.h"
 #include "deploy/cli/dataset_report.h"
 #include "deploy/process/interrupt.h"
 #include "replay/dataset/dataset_reader.h"
@@ -14,6 +15,9 @@ class App;
 }
 
 namespace dbr {
+
+// How often a subcommand says how far it has come where the output is no terminal.
+inline constexpr absl::Duration kProgressEvery = absl::Seconds(10);
 
 // Adds `record` to the command `dataset`, as the functions of command_line.h add to the program.
 void AddDatasetRecord(CLI::App* dataset, int* exit_code);

@@ -26,7 +26,6 @@
 namespace dbr {
 namespace {
 
-constexpr absl::Duration kProgressEvery = absl::Seconds(10);
 constexpr std::int64_t kMaxSteps = 1'000'000'000;
 
 struct RecordFlags {
