@@ -61,7 +61,7 @@ class MetadataReader {
   const absl::Status& status() const { return status_; }
 
  private:
-  void Fail(absl::Status status) { status_.Update(status); }
+  void Fail(const absl::Status& status) { status_.Update(status); }
   void FailAsDamaged(const std::string& key, absl::string_view expected, const std::string& found) {
     Fail(absl::DataLossError(absl::StrCat(path_, " is damaged: metadata '", key, "': expected ", expected,
                                           ", found '", found, "'")));

@@ -232,6 +232,7 @@ std::vector<ProcessSpec> Services(const RunPlan& plan, const std::string& progra
 
 std::vector<ProcessSpec> Actors(const RunPlan& plan, const std::string& programs) {
   std::vector<ProcessSpec> actors;
+  actors.reserve(static_cast<std::size_t>(plan.actors));
   for (int i = 0; i < plan.actors; ++i)
     actors.push_back(MakeActor(plan, programs, absl::StrCat("actor-", i), i));
   return actors;
