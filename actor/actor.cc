@@ -101,14 +101,14 @@ Actor::Actor(const ActorOptions& options, std::unique_ptr<VectorEnv> envs)
       writer_(std::make_unique<TransitionWriter>(Writing(options, envs_->spec()))) {}
 
 void Actor::Stop() {
-  absl::call_once(stop_once_, [this] { stopping_.Notify(); });
+  stopping_.Set();
   subscriber_->Close();
 }
 
 absl::Status Actor::Run() {
   const absl::Status status = Act();
   Drain();
-  return stopping_.HasBeenNotified() ? absl::OkStatus() : status;
+  return stopping_.IsSet() ? absl::OkStatus() : status;
 }
 
 absl::Status Actor::Act() {
@@ -130,7 +130,7 @@ absl::Status Actor::Act() {
                   return Write(transition, advantage, critic_version, end);
                 });
   BrokenWorlds worlds;
-  while (!stopping_.HasBeenNotified()) {
+  while (!stopping_.IsSet()) {
     ASSIGN_OR_RETURN(const PolicySubscriber::PolicyPtr policy, subscriber_->Current());
     RETURN_IF_ERROR(loop.Step(*policy));
     worlds.Tell(loop.counters());
@@ -162,8 +162,7 @@ absl::Status Actor::Write(const TransitionView& transition, float advantage, std
   for (;;) {
     const absl::Status status = writer_->Append(transition, advantage, critic_version, end, kStopCheck);
     if (!absl::IsDeadlineExceeded(status)) return status;
-    if (stopping_.HasBeenNotified())
-      return absl::CancelledError("stopped while the replay server took no transitions");
+    if (stopping_.IsSet()) return absl::CancelledError("stopped while the replay server took no transitions");
   }
 }
 

@@ -4,14 +4,13 @@
 #include <memory>
 #include <string>
 
-#include "absl/base/call_once.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/synchronization/notification.h"
 #include "absl/time/time.h"
 #include "actor/evaluation_loop.h"
 #include "actor/policy_subscriber.h"
 #include "actor/step_loop.h"
+#include "core/stop_flag.h"
 #include "envs/env.h"
 #include "proto/config.pb.h"
 #include "proto/policy.pb.h"
@@ -61,8 +60,7 @@ class Actor {
   std::unique_ptr<VectorEnv> envs_;  // until the step loop takes them
   std::unique_ptr<PolicySubscriber> subscriber_;
   std::unique_ptr<TransitionWriter> writer_;
-  absl::once_flag stop_once_;
-  absl::Notification stopping_;
+  StopFlag stopping_;
 };
 
 // Evaluates the newest policy again and again and reports to the learner. One thread calls Run; Stop is

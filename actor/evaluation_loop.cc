@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/monotonic_clock.h"
 #include "core/status_macros.h"
 #include "envs/registry/registry.h"
 #include "proto/rpc/grpc_status.h"
@@ -55,7 +56,7 @@ EvaluationLoop::EvaluationLoop(EvaluationLoopOptions options, EvaluationLoopPort
   if (ports_.wait_until) return;
   ports_.wait_until = [this](absl::Time deadline) {
     absl::MutexLock lock(&mutex_);
-    mutex_.AwaitWithDeadline(absl::Condition(&closed_), deadline);
+    AwaitUntil(&mutex_, absl::Condition(&closed_), deadline);
   };
 }
 

@@ -15,9 +15,9 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
-#include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include "actor/evaluator.h"
+#include "core/monotonic_clock.h"
 #include "nn/policy.h"
 #include "proto/policy.pb.h"
 
@@ -49,7 +49,7 @@ struct EvaluationLoopPorts {
   // Receives the policy whose mean over the opponents (of scores, else of returns) is the greatest so far,
   // before it is reported. May be null.
   std::function<void(const PolicySnapshot&)> keep_best = nullptr;
-  std::function<absl::Time()> now = absl::Now;
+  std::function<absl::Time()> now = MonotonicNow;
   // Returns at the deadline, or at once after Close(). Null means waiting by the real clock.
   std::function<void(absl::Time)> wait_until = nullptr;
 };

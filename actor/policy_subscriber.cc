@@ -8,11 +8,13 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/monotonic_clock.h"
 #include "core/status_macros.h"
 #include "proto/config/config_file.h"
 #include "proto/policy.grpc.pb.h"
 #include "proto/rpc/channel.h"
 #include "proto/rpc/codec.h"
+#include "proto/rpc/deadline.h"
 #include "proto/rpc/grpc_status.h"
 #include "proto/rpc/protocol.h"
 
@@ -60,7 +62,7 @@ absl::StatusOr<PolicySubscriber::PolicyPtr> PolicySubscriber::WaitForOther(const
   const auto ready = [&]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     return closed_ || !final_.ok() || (current_ != nullptr && current_ != last);
   };
-  mutex_.AwaitWithTimeout(absl::Condition(&ready), timeout);
+  AwaitFor(&mutex_, absl::Condition(&ready), timeout);
   if (!final_.ok()) return final_;
   if (closed_) return absl::CancelledError("the subscription to the learner's policy is closed");
   if (!ready()) {
@@ -93,7 +95,7 @@ void PolicySubscriber::Run() {
     const double growth = std::pow(2.0, std::min(attempts_++, 20));
     const absl::Duration backoff = std::min(options_.first_backoff * growth, options_.max_backoff);
     absl::MutexLock lock(&mutex_);
-    if (mutex_.AwaitWithTimeout(absl::Condition(&closed_), backoff * (0.5 + 0.5 * rng_.Uniform()))) return;
+    if (AwaitFor(&mutex_, absl::Condition(&closed_), backoff * (0.5 + 0.5 * rng_.Uniform()))) return;
   }
 }
 

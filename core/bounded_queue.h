@@ -9,6 +9,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
+#include "core/monotonic_clock.h"
 
 namespace dbr {
 
@@ -38,7 +39,7 @@ class BoundedQueue {
   // nullopt.
   std::optional<T> Pop(absl::Duration timeout = absl::InfiniteDuration()) {
     absl::MutexLock lock(&mutex_);
-    mutex_.AwaitWithTimeout(absl::Condition(this, &BoundedQueue::CanPop), timeout);
+    AwaitFor(&mutex_, absl::Condition(this, &BoundedQueue::CanPop), timeout);
     if (items_.empty()) return std::nullopt;
     T value = std::move(items_.front());
     items_.pop_front();

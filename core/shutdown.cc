@@ -30,6 +30,15 @@ void BlockShutdownSignals() {
   signal(SIGPIPE, SIG_IGN);
 }
 
+std::thread ThreadWithoutSignals(std::function<void()> run) {
+  sigset_t all, before;
+  sigfillset(&all);
+  DBR_CHECK(pthread_sigmask(SIG_SETMASK, &all, &before) == 0);
+  std::thread thread(std::move(run));
+  DBR_CHECK(pthread_sigmask(SIG_SETMASK, &before, nullptr) == 0);
+  return thread;
+}
+
 ShutdownWatcher::ShutdownWatcher(std::function<void()> on_signal) {
   const sigset_t set = ShutdownSignals();
   signal_fd_ = signalfd(-1, &set, SFD_CLOEXEC);

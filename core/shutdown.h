@@ -11,6 +11,10 @@ namespace dbr {
 // drain.
 void BlockShutdownSignals();
 
+// Starts a thread in which all signals are blocked: they are for the process's other threads, also for one
+// that will only block or wait for them later.
+std::thread ThreadWithoutSignals(std::function<void()> run);
+
 // Runs `on_signal` in a thread of its own at each SIGINT or SIGTERM, until destroyed; the destructor joins
 // the thread. Requires that BlockShutdownSignals() was called before any thread was started.
 class ShutdownWatcher {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
+#include "core/monotonic_clock.h"
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
 #include "deploy/cli/common_options.h"
@@ -58,9 +58,9 @@ absl::Status Convert(const ConvertFlags& flags, const Interrupt& interrupt) {
   state.label = absl::StrCat(DatasetLayoutName(reader->layout()), " to ", flags.to);
   state.unit = "rows";
   state.total = reader->facts().rows;
-  ProgressBar bar(stderr, state, absl::Now(), kProgressEvery);
+  ProgressBar bar(stderr, state, MonotonicNow(), kProgressEvery);
   RETURN_IF_ERROR(CopyDataset(reader.get(), writer.get(), [&](std::int64_t transitions) {
-    bar.Update(transitions, absl::Now());
+    bar.Update(transitions, MonotonicNow());
     return !interrupt.flag();
   }));
   return writer->Finish();

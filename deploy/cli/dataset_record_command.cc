@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
+#include "core/monotonic_clock.h"
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
 #include "deploy/cli/common_options.h"
@@ -67,7 +67,7 @@ std::unique_ptr<ProgressBar> MakeBar(const RecordFlags& flags, const EnvSpec& en
   state.label = absl::StrCat(env.name, " ", flags.quality);
   state.unit = "steps";
   state.total = steps;
-  return std::make_unique<ProgressBar>(stderr, state, absl::Now(), kProgressEvery);
+  return std::make_unique<ProgressBar>(stderr, state, MonotonicNow(), kProgressEvery);
 }
 
 absl::StatusOr<std::shared_ptr<const PolicyNetworks>> MediumPolicy(const RecordFlags& flags,
@@ -92,7 +92,7 @@ absl::Status RecordPlay(const RecordFlags& flags, const EnvSpec& env, DatasetWri
   }
   const std::unique_ptr<ProgressBar> bar = MakeBar(flags, env, flags.steps);
   const RecordSinks sinks = {.episode = [&](const EpisodeView& episode) { return writer->Append(episode); },
-                             .progress = [&](std::int64_t steps) { bar->Update(steps, absl::Now()); }};
+                             .progress = [&](std::int64_t steps) { bar->Update(steps, MonotonicNow()); }};
   return RecordEpisodes(options, sinks, interrupt.flag());
 }
 
@@ -115,7 +115,7 @@ absl::Status RecordRun(const RecordFlags& flags, const RunStore& run, DatasetWri
     if (steps == 0) break;
     RETURN_IF_ERROR(writer->Append(CopyEpisode(*run.store, episode, steps).View()));
     left -= static_cast<std::int64_t>(steps);
-    bar->Update(written += static_cast<std::int64_t>(steps), absl::Now());
+    bar->Update(written += static_cast<std::int64_t>(steps), MonotonicNow());
   }
   const std::uint64_t evicted = run.store->inserted() - run.store->size();
   if (evicted > 0) {
@@ -154,11 +154,11 @@ absl::Status Record(const RecordFlags& flags, const Interrupt& interrupt) {
 
 absl::StatusOr<int> RunRecord(const RecordFlags& flags) {
   const Interrupt interrupt;
-  const absl::Time start = absl::Now();
+  const absl::Time start = MonotonicNow();
   const absl::Status recorded = Record(flags, interrupt);
   if (absl::IsCancelled(recorded)) return kInterruptedExit;
   RETURN_IF_ERROR(recorded);
-  const double seconds = absl::ToDoubleSeconds(absl::Now() - start);
+  const double seconds = absl::ToDoubleSeconds(MonotonicNow() - start);
   ASSIGN_OR_RETURN(const DatasetReport report, ReportDataset(flags.out, std::nullopt, interrupt));
   std::printf("%s  %s in %s s, %s steps/s\n", DatasetText(report).c_str(), PadRight("recorded", 12).c_str(),
               Fixed(seconds, 1).c_str(),

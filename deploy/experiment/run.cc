@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
+#include "core/monotonic_clock.h"
 #include "core/run_folder.h"
 #include "core/status_macros.h"
 #include "deploy/launch/summary_reader.h"
@@ -60,8 +60,8 @@ absl::StatusOr<int> ExperimentRun::Run() {
     StartDue();
     if (running_.empty()) break;
     ReadProgress();
-    screen_.Update(State(), absl::Now());
-    RETURN_IF_ERROR(supervisor_->Wait(absl::Now() + kLookEvery));
+    screen_.Update(State(), MonotonicNow());
+    RETURN_IF_ERROR(supervisor_->Wait(MonotonicNow() + kLookEvery));
     TakeEnded();
   }
   if (!running_.empty())
@@ -145,7 +145,7 @@ absl::Status ExperimentRun::Start(Entry* entry) {
   RETURN_IF_ERROR(PrepareCell(cell));
   RETURN_IF_ERROR(Launch(cell, resume));
   entry->outcome = Outcome::kRunning;
-  entry->started = absl::Now();
+  entry->started = MonotonicNow();
   screen_.Say(absl::StrCat(resume ? "continuing " : "started ", cell.name()));
   return absl::OkStatus();
 }
@@ -177,7 +177,7 @@ void ExperimentRun::Judge(Entry* entry, const EndedProcess& ended) {
   const Cell& cell = entry->cell;
   const CellStanding standing = ReadStanding(cell);
   if (ended.wait_status == 0 && standing.state == CellState::kDone) {
-    const absl::Duration took = absl::Now() - entry->started;
+    const absl::Duration took = MonotonicNow() - entry->started;
     entry->outcome = Outcome::kDone;
     durations_.Add(cell, took + absl::Seconds(entry->before.wall_s));
     screen_.Say(absl::StrCat("done ", cell.name(), " in ", Clock(took), ": ", ResultText(standing.summary)));
@@ -236,7 +236,7 @@ std::optional<absl::Duration> ExperimentRun::TimeLeft() const {
   std::vector<RunningCell> running;
   for (const auto& [name, index] : running_) {
     const Entry& entry = entries_[index];
-    const absl::Duration took = absl::Seconds(entry.before.wall_s) + (absl::Now() - entry.started);
+    const absl::Duration took = absl::Seconds(entry.before.wall_s) + (MonotonicNow() - entry.started);
     const std::optional<absl::Duration> expected = durations_.Expected(entry.cell);
     std::optional<absl::Duration> left = ProgressOf(entry.cell.config, entry.newest).left;
     if (left.has_value()) known.Add(entry.cell, took + *left);

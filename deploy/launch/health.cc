@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "proto/health.grpc.pb.h"
 #include "proto/rpc/channel.h"
+#include "proto/rpc/deadline.h"
 #include "proto/rpc/grpc_status.h"
 
 namespace dbr {

@@ -7,10 +7,10 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
 #include "actor/evaluation_loop.h"
 #include "actor/evaluator.h"
 #include "core/file_io.h"
+#include "core/monotonic_clock.h"
 #include "core/status_macros.h"
 #include "deploy/launch/commit.h"
 #include "deploy/launch/health.h"
@@ -95,7 +95,7 @@ const EnvPresentation& Launch::presentation() const {
 
 absl::StatusOr<int> Launch::Run() {
   Announce();
-  watch_.Start(absl::Now());
+  watch_.Start(MonotonicNow());
   absl::Status status = StartAll();
   if (status.ok()) status = Train();
   line_.End();
@@ -154,7 +154,7 @@ absl::Status Launch::StartAll() {
   supervisor_->set_restarting(true);
   monitor_ = std::make_unique<RunMonitor>(plan_.replay_address, plan_.learner_address, kAskEvery,
                                           [supervisor = supervisor_.get()] { supervisor->Wake(); });
-  watch_.StartTraining(absl::Now());
+  watch_.StartTraining(MonotonicNow());
   TellOfTheSeedBuffer();
   return absl::OkStatus();
 }
@@ -195,7 +195,7 @@ absl::Status Launch::WaitUntilServing(const std::string& name, const std::string
 
 absl::Status Launch::Train() {
   while (supervisor_->stop_signals() == 0) {
-    const absl::Time now = absl::Now();
+    const absl::Time now = MonotonicNow();
     const RunSample sample = monitor_->Latest();
     RETURN_IF_ERROR(sample.refusal);
     Observe(sample, now);
@@ -234,7 +234,7 @@ bool Launch::StopAll(bool ask) {
   monitor_.reset();
   clean = supervisor_->Stop() && clean;
   supervisor_.reset();
-  watch_.CountWallTime(absl::Now());
+  watch_.CountWallTime(MonotonicNow());
   return clean;
 }
 

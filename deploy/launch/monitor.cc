@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/monotonic_clock.h"
 #include "proto/rpc/grpc_status.h"
 
 namespace dbr {
@@ -62,7 +63,7 @@ void RunMonitor::Run() {
     on_sample_();
     if (refused) return;
     absl::MutexLock lock(&mutex_);
-    if (mutex_.AwaitWithTimeout(absl::Condition(&stopping_), period_)) return;
+    if (AwaitFor(&mutex_, absl::Condition(&stopping_), period_)) return;
   }
 }
 

@@ -16,8 +16,8 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
-#include "absl/time/clock.h"
 #include "core/file_io.h"
+#include "core/monotonic_clock.h"
 #include "core/shutdown.h"
 #include "core/status_macros.h"
 #include "deploy/process/child_process.h"
@@ -39,9 +39,9 @@ absl::StatusOr<std::string> FindGnuplot() {
 
 // Blocks until the process of `pidfd` has ended. Returns false where the deadline came first.
 bool WaitForEnd(int pidfd, absl::Duration deadline) {
-  const absl::Time end = absl::Now() + deadline;
+  const absl::Time end = MonotonicNow() + deadline;
   for (;;) {
-    const auto left = absl::ToInt64Milliseconds(end - absl::Now());
+    const auto left = absl::ToInt64Milliseconds(end - MonotonicNow());
     if (left <= 0) return false;
     pollfd fds = {pidfd, POLLIN, 0};
     if (poll(&fds, 1, static_cast<int>(left)) > 0) return true;

@@ -6,6 +6,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
+#include "core/monotonic_clock.h"
 #include "core/shutdown.h"
 
 namespace dbr {
@@ -23,7 +24,7 @@ class Interrupt {
   // Blocks for `duration` or until a signal. Returns whether a signal came.
   bool WaitFor(absl::Duration duration) {
     absl::MutexLock lock(&mutex_);
-    return mutex_.AwaitWithTimeout(absl::Condition(&set_), duration);
+    return AwaitFor(&mutex_, absl::Condition(&set_), duration);
   }
 
  private:

@@ -15,8 +15,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "absl/time/clock.h"
 #include "core/file_io.h"
+#include "core/monotonic_clock.h"
 #include "core/status_macros.h"
 #include "deploy/process/child_process.h"
 #include "deploy/process/log_tail.h"
@@ -111,7 +111,7 @@ void Supervisor::Wake() {
 
 // Blocks until `deadline` or an event, and reads the signals that came.
 void Supervisor::Poll(absl::Time deadline) {
-  const absl::Duration left = std::clamp(deadline - absl::Now(), absl::ZeroDuration(), absl::Hours(1));
+  const absl::Duration left = std::clamp(deadline - MonotonicNow(), absl::ZeroDuration(), absl::Hours(1));
   pollfd fds[2] = {{signal_fd_, POLLIN, 0}, {wake_fd_, POLLIN, 0}};
   poll(fds, 2, static_cast<int>(absl::ToInt64Milliseconds(absl::Ceil(left, absl::Milliseconds(1)))));
   std::uint64_t wakes;
@@ -167,7 +167,7 @@ absl::Status Supervisor::OnDeath(Child* child, int wait_status) {
     options_.on_event(death, /*notable=*/true);
     return absl::AbortedError(absl::StrCat(failure, "\n  whole log: ", spec.log));
   }
-  const absl::Time now = absl::Now();
+  const absl::Time now = MonotonicNow();
   while (!child->restarts.empty() && child->restarts.front() < now - options_.restart_window) {
     child->restarts.pop_front();
   }
@@ -196,7 +196,7 @@ absl::Time Supervisor::NextRestart() const {
 
 absl::Status Supervisor::RestartDue() {
   for (const auto& child : children_) {
-    if (child->restart_at > absl::Now()) continue;
+    if (child->restart_at > MonotonicNow()) continue;
     ++restarts_;
     RETURN_IF_ERROR(Spawn(child.get(), /*again=*/true));
   }
@@ -226,7 +226,7 @@ bool Supervisor::StopRank(int rank) {
     child->restart_at = absl::InfiniteFuture();
     if (child->spec.stop_rank != rank || child->pid == 0) continue;
     kill(child->pid, SIGTERM);
-    deadline = std::max(deadline, absl::Now() + child->spec.stop_grace);
+    deadline = std::max(deadline, MonotonicNow() + child->spec.stop_grace);
   }
   const int signals_before = stop_signals_;
   bool killed = false;
@@ -234,7 +234,7 @@ bool Supervisor::StopRank(int rank) {
   while (ReapStopped(rank, &clean)) {
     Poll(deadline);
     const bool interrupted = stop_signals_ != signals_before;
-    if (killed || (!interrupted && absl::Now() < deadline)) continue;
+    if (killed || (!interrupted && MonotonicNow() < deadline)) continue;
     if (!ReapStopped(rank, &clean)) break;
     KillRank(rank, interrupted);
     killed = true;

@@ -12,6 +12,7 @@
 #include "absl/time/time.h"
 #include "actor/policy_fit.h"
 #include "actor/vector_env.h"
+#include "core/monotonic_clock.h"
 #include "core/rng.h"
 #include "core/status_macros.h"
 #include "envs/registry/registry.h"
@@ -126,7 +127,7 @@ class Recording {
   // The next group in order; empty where none was ready within `wait`.
   absl::StatusOr<Group> NextGroup(absl::Duration wait) {
     absl::MutexLock lock(&mutex_);
-    mutex_.AwaitWithTimeout(absl::Condition(this, &Recording::NextIsReady), wait);
+    AwaitFor(&mutex_, absl::Condition(this, &Recording::NextIsReady), wait);
     RETURN_IF_ERROR(failure_);
     const auto first = ready_.find(next_out_);
     if (first == ready_.end()) return Group();

@@ -7,11 +7,11 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
-#include "absl/synchronization/notification.h"
 #include "absl/time/clock.h"
 #include "core/run_folder.h"
 #include "core/shutdown.h"
 #include "core/status_macros.h"
+#include "core/stop_flag.h"
 #include "deploy/manual/man_page.h"
 #include "envs/env.h"
 #include "envs/registry/registry.h"
@@ -22,6 +22,7 @@
 #include "learner/runtime/trainer.h"
 #include "nn/blas_setup.h"
 #include "proto/config/config_file.h"
+#include "proto/rpc/deadline.h"
 #include "proto/rpc/server.h"
 #include "proto/rpc/service_main.h"
 #include "replay/client/await_stats.h"
@@ -72,13 +73,13 @@ absl::Status Resume(const RunFolder& folder, const LearnerConfig& config, Traine
 // Labels that the replay has may be newer than what `trainer` goes on from, and it refuses older ones: no
 // training before it has told of them. Blocks until then, or until a signal has stopped the trainer.
 absl::Status ContinueVersions(ReplayClient* replay, Trainer* trainer) {
-  absl::Notification stopping;
+  StopFlag stopping;
   const ShutdownWatcher watcher([&] {
-    if (!stopping.HasBeenNotified()) stopping.Notify();
+    stopping.Set();
     trainer->Stop();
   });
   const absl::StatusOr<StatsReply> stats = AwaitStats(replay, "to hear of its newest labels", stopping);
-  if (stopping.HasBeenNotified()) return absl::OkStatus();
+  if (stopping.IsSet()) return absl::OkStatus();
   RETURN_IF_ERROR(stats.status());
   trainer->StartVersionsAfter(stats->newest_critic_version());
   return absl::OkStatus();
@@ -132,7 +133,7 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
     status = trainer.Run();
   }
   service.Close();
-  running.server->Shutdown(absl::ToChronoTime(absl::Now() + absl::Seconds(1)));
+  running.server->Shutdown(DeadlineAfter(absl::Seconds(1)));
   status.Update(metrics->Flush());
   return status;
 }

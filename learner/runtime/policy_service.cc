@@ -7,6 +7,7 @@
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "absl/time/time.h"
+#include "core/monotonic_clock.h"
 #include "proto/rpc/codec.h"
 #include "proto/rpc/grpc_status.h"
 #include "proto/rpc/protocol.h"
@@ -42,7 +43,7 @@ std::shared_ptr<const PolicyMessage> PolicyService::WaitForOther(std::uint64_t h
     return closed_ || (newest_ != nullptr && newest_->version() != have);
   };
   absl::MutexLock lock(&mutex_);
-  if (!mutex_.AwaitWithTimeout(absl::Condition(&ready), timeout) || closed_) return nullptr;
+  if (!AwaitFor(&mutex_, absl::Condition(&ready), timeout) || closed_) return nullptr;
   return newest_;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "core/monotonic_clock.h"
 #include "proto/rpc/grpc_status.h"
 
 namespace dbr {
@@ -82,7 +83,7 @@ bool Prefetcher::HandleFailure(const absl::Status& status, bool* away) {
   if (!std::exchange(*away, true)) {
     spdlog::warn("the replay server gives no batches, trying again: {}", std::string(status.message()));
   }
-  mutex_.AwaitWithTimeout(absl::Condition(this, &Prefetcher::Closed), options_.retry_after);
+  AwaitFor(&mutex_, absl::Condition(this, &Prefetcher::Closed), options_.retry_after);
   return !closed_;
 }
 

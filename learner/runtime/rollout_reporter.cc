@@ -6,6 +6,7 @@
 #include <string>
 
 #include "absl/time/clock.h"
+#include "core/monotonic_clock.h"
 
 namespace dbr {
 
@@ -25,7 +26,7 @@ void RolloutReporter::Run() {
   for (;;) {
     {
       absl::MutexLock lock(&mutex_);
-      if (mutex_.AwaitWithTimeout(absl::Condition(&closed_), period_)) return;
+      if (AwaitFor(&mutex_, absl::Condition(&closed_), period_)) return;
     }
     if (const absl::StatusOr<StatsReply> stats = client_->Stats(absl::Seconds(2)); stats.ok()) Report(*stats);
   }

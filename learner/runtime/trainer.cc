@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/time/clock.h"
+#include "core/monotonic_clock.h"
 #include "core/status_macros.h"
 #include "learner/runtime/policy_service.h"
 #include "learner/training/tensor_state.h"
@@ -26,7 +27,7 @@ absl::Status Trainer::Load(const TensorFile& file) {
 }
 
 absl::Status Trainer::Run() {
-  last_record_ = last_checkpoint_ = absl::Now();
+  last_record_ = last_checkpoint_ = MonotonicNow();
   updates_at_record_ = updates_;
   Publish();
   absl::Status status;
@@ -75,7 +76,7 @@ void Trainer::SetStatus(bool finished) {
   LearnerStatus status;
   status.set_updates(updates_);
   status.set_policy_version(snapshot_.version);
-  const double seconds = absl::ToDoubleSeconds(absl::Now() - last_record_);
+  const double seconds = absl::ToDoubleSeconds(MonotonicNow() - last_record_);
   const double since_record = static_cast<double>(updates_ - updates_at_record_);
   status.set_updates_per_second(seconds > 1 ? since_record / seconds : updates_per_second_);
   status.set_finished(finished);
@@ -88,7 +89,7 @@ void Trainer::SetStatus(bool finished) {
 }
 
 void Trainer::Record() {
-  const absl::Time now = absl::Now();
+  const absl::Time now = MonotonicNow();
   updates_per_second_ =
       static_cast<double>(updates_ - updates_at_record_) / absl::ToDoubleSeconds(now - last_record_);
   last_record_ = now;
@@ -99,14 +100,15 @@ void Trainer::Record() {
                      {"learner/labels_dropped", static_cast<double>(parts_.relabeller->dropped())}};
   for (const UpdateMetric& metric : parts_.algorithm->metrics())
     scalars.emplace_back(metric.name, metric.value);
-  if (const absl::Status status = parts_.metrics->Write(static_cast<std::int64_t>(updates_), now, scalars);
+  if (const absl::Status status =
+          parts_.metrics->Write(static_cast<std::int64_t>(updates_), absl::Now(), scalars);
       !status.ok()) {
     spdlog::error("metrics: {}", std::string(status.message()));
   }
 }
 
 void Trainer::MaybeCheckpoint() {
-  const absl::Time now = absl::Now();
+  const absl::Time now = MonotonicNow();
   if (now - last_checkpoint_ < absl::Seconds(config_.checkpoint_every_s())) return;
   last_checkpoint_ = now;
   parts_.saver->Offer(MakeCheckpoint());

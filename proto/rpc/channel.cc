@@ -1,6 +1,5 @@
 #include "proto/rpc/channel.h"
 
-#include "absl/time/clock.h"
 #include "proto/rpc/grpc_library.h"
 #include "proto/rpc/keepalive.h"
 
@@ -20,10 +19,6 @@ std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address) {
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // as many as it takes while a stream waits
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
-}
-
-void SetDeadline(absl::Duration timeout, grpc::ClientContext* context) {
-  context->set_deadline(absl::ToChronoTime(absl::Now() + timeout));
 }
 
 }  // namespace dbr

@@ -6,8 +6,6 @@
 #include <memory>
 #include <string>
 
-#include "absl/time/time.h"
-
 namespace dbr {
 
 // A channel to "unix:/path" or "host:port" with a connection that no other channel shares. It connects in the
@@ -15,8 +13,5 @@ namespace dbr {
 // has vanished is given up after the times of proto/rpc/keepalive.h. Replies may be of any size. Initializes
 // gRPC for the rest of the process.
 std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address);
-
-// Sets the deadline of a call to `timeout` from now.
-void SetDeadline(absl::Duration timeout, grpc::ClientContext* context);
 
 }  // namespace dbr

@@ -5,6 +5,7 @@
 #include "core/status_macros.h"
 #include "proto/policy.grpc.pb.h"
 #include "proto/rpc/channel.h"
+#include "proto/rpc/deadline.h"
 #include "proto/rpc/grpc_status.h"
 #include "proto/rpc/protocol.h"
 

@@ -1,6 +1,7 @@
 #include "replay/buffer/admission.h"
 
 #include "absl/strings/str_cat.h"
+#include "core/monotonic_clock.h"
 
 namespace dbr {
 
@@ -33,7 +34,7 @@ absl::Status Admission::AwaitInsert(absl::Mutex* mutex, absl::Time deadline) {
   const auto ready = [this] { return closed_ || CanInsert(); };
   if (!ready()) {
     ++waiting_.inserts;
-    mutex->AwaitWithDeadline(absl::Condition(&ready), deadline);
+    AwaitUntil(mutex, absl::Condition(&ready), deadline);
     --waiting_.inserts;
   }
   if (closed_) return CheckOpen();
@@ -74,7 +75,7 @@ absl::Status Admission::AwaitDraw(absl::Mutex* mutex, const DrawRequest& request
     waiting_.draws_of_plus += plus;
     waiting_.draws_of_minus += minus;
     waiting_.newest_draw = request;
-    mutex->AwaitWithDeadline(absl::Condition(&ready), deadline);
+    AwaitUntil(mutex, absl::Condition(&ready), deadline);
     --waiting_.draws;
     waiting_.draws_of_plus -= plus;
     waiting_.draws_of_minus -= minus;

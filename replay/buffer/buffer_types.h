@@ -6,7 +6,6 @@
 #include <functional>
 #include <string>
 
-#include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include "absl/types/span.h"
 #include "core/transition.h"

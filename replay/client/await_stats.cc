@@ -15,14 +15,14 @@ constexpr absl::Duration kAskEvery = absl::Seconds(1);
 }  // namespace
 
 absl::StatusOr<StatsReply> AwaitStats(ReplayClient* client, absl::string_view purpose,
-                                      const absl::Notification& stopping) {
-  for (bool first = true; !stopping.HasBeenNotified(); first = false) {
+                                      const StopFlag& stopping) {
+  for (bool first = true; !stopping.IsSet(); first = false) {
     absl::StatusOr<StatsReply> stats = client->Stats(kAskEvery);
     if (stats.ok() || IsFinal(stats.status())) return stats;
     if (first)
       spdlog::info("waiting for the replay server, {}: {}", std::string(purpose),
                    std::string(stats.status().message()));
-    stopping.WaitForNotificationWithTimeout(kAskEvery);
+    stopping.WaitFor(kAskEvery);
   }
   return absl::CancelledError("stopped while the replay server did not answer");
 }

@@ -3,7 +3,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
-#include "absl/synchronization/notification.h"
+#include "core/stop_flag.h"
 #include "proto/replay.pb.h"
 #include "replay/client/client.h"
 
@@ -13,6 +13,6 @@ namespace dbr {
 // newest labels"). Blocks. Errors: Cancelled within a second after `stopping`, and those that no waiting
 // mends (IsFinal): another program listens at the address, or one that speaks another protocol version.
 absl::StatusOr<StatsReply> AwaitStats(ReplayClient* client, absl::string_view purpose,
-                                      const absl::Notification& stopping);
+                                      const StopFlag& stopping);
 
 }  // namespace dbr

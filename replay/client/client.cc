@@ -9,11 +9,11 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
-#include "absl/time/clock.h"
 #include "core/status_macros.h"
 #include "proto/replay.grpc.pb.h"
 #include "proto/rpc/channel.h"
 #include "proto/rpc/codec.h"
+#include "proto/rpc/deadline.h"
 #include "proto/rpc/grpc_status.h"
 #include "proto/rpc/protocol.h"
 
@@ -55,7 +55,7 @@ class ReplayClient::Impl {
       if (closed_) return absl::CancelledError("the replay client is closed");
       contexts_.insert(&context);
     }
-    channel_->WaitForConnected(absl::ToChronoTime(absl::Now() + std::min(timeout, kConnectTime)));
+    channel_->WaitForConnected(DeadlineAfter(std::min(timeout, kConnectTime)));
     const grpc::Status status = call(&context);
     absl::MutexLock lock(&mutex_);
     contexts_.erase(&context);

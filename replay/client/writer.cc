@@ -8,7 +8,7 @@
 #include "absl/base/thread_annotations.h"
 #include "absl/strings/str_cat.h"
 #include "absl/synchronization/mutex.h"
-#include "absl/time/clock.h"
+#include "core/monotonic_clock.h"
 #include "core/rng.h"
 #include "core/status_macros.h"
 #include "proto/replay.grpc.pb.h"
@@ -71,7 +71,7 @@ class TransitionWriter::Impl {
   absl::Status Append(const TransitionView& transition, float advantage, std::uint64_t critic_version,
                       const std::optional<EpisodeEnd>& end, absl::Duration timeout) {
     RETURN_IF_ERROR(CheckWidths(options_.layout, transition));
-    const absl::Time now = absl::Now();
+    const absl::Time now = MonotonicNow();
     absl::MutexLock lock(&mutex_);
     const auto has_room = [this]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
       return Ended() || outbox_.appended() - outbox_.acknowledged() < options_.buffered_transitions;
@@ -112,7 +112,7 @@ class TransitionWriter::Impl {
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
     if (!ready()) {
       ++callers_waiting_;
-      mutex_.AwaitWithTimeout(absl::Condition(&ready), timeout);
+      AwaitFor(&mutex_, absl::Condition(&ready), timeout);
       --callers_waiting_;
     }
     if (!final_error_.ok()) return final_error_;
@@ -131,9 +131,9 @@ class TransitionWriter::Impl {
       const auto sooner = [this, next_time]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
         return closed_ || broken_ || outbox_.NextTime(callers_waiting_ > 0) < next_time;
       };
-      mutex_.AwaitWithDeadline(absl::Condition(&sooner), next_time);
+      AwaitUntil(&mutex_, absl::Condition(&sooner), next_time);
       if (closed_ || broken_) return nullptr;
-      if (auto message = outbox_.Next(absl::Now(), callers_waiting_ > 0)) return message;
+      if (auto message = outbox_.Next(MonotonicNow(), callers_waiting_ > 0)) return message;
     }
   }
 
@@ -230,7 +230,7 @@ class TransitionWriter::Impl {
         std::min(kLongestBackoff, kFirstBackoff * (1 << std::min(failures_++, 10)));
     const absl::Duration pause = longest * (0.5 + 0.5 * jitter_.Uniform());
     absl::MutexLock lock(&mutex_);
-    mutex_.AwaitWithTimeout(absl::Condition(&closed_), pause);
+    AwaitFor(&mutex_, absl::Condition(&closed_), pause);
   }
 
   const WriterOptions options_;

@@ -2,12 +2,12 @@
 
 #include <unistd.h>
 
-#include <chrono>
 #include <utility>
 #include <vector>
 
 #include "core/status_macros.h"
 #include "proto/config/config_file.h"
+#include "proto/rpc/deadline.h"
 #include "replay/service/service.h"
 
 namespace dbr {
@@ -77,7 +77,7 @@ absl::Status ReplayServer::Stop() {
   if (running_.server == nullptr) return absl::OkStatus();
   buffer_->Close();
   // Streams of inserts that are idle end only by this deadline.
-  running_.server->Shutdown(std::chrono::system_clock::now() + std::chrono::milliseconds(500));
+  running_.server->Shutdown(DeadlineAfter(absl::Milliseconds(500)));
   running_.server->Wait();
   running_.server.reset();
   return buffer_->Sync();

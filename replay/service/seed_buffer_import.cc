@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
+#include "core/monotonic_clock.h"
 #include "core/status_macros.h"
 #include "replay/dataset/dataset_reader.h"
 #include "replay/dataset/return_reader.h"
@@ -115,7 +115,7 @@ absl::StatusOr<SeedBufferRecord> ImportSeedBuffer(const SeedBufferOptions& optio
                                                   PartitionedBuffer* buffer) {
   const BufferStats before = buffer->Stats();
   if (before.seed_buffer_record.complete != 0) return before.seed_buffer_record;
-  const absl::Time start = absl::Now();
+  const absl::Time start = MonotonicNow();
   const TransitionLayout& layout = buffer->layout();
   ASSIGN_OR_RETURN(const std::unique_ptr<DatasetReader> reader,
                    OpenFitting(options, layout, buffer->capacity()));
@@ -131,7 +131,8 @@ absl::StatusOr<SeedBufferRecord> ImportSeedBuffer(const SeedBufferOptions& optio
   }
   // Bad rows may have been left out.
   RETURN_IF_ERROR(CheckEnough(options, static_cast<std::uint64_t>(reader->facts().transitions)));
-  RETURN_IF_ERROR(buffer->CompleteSeedBuffer(RecordOf(reader->facts(), absl::Now() - start), !options.evict));
+  RETURN_IF_ERROR(
+      buffer->CompleteSeedBuffer(RecordOf(reader->facts(), MonotonicNow() - start), !options.evict));
   return buffer->Stats().seed_buffer_record;
 }
 

@@ -5,8 +5,9 @@
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
+#include "core/monotonic_clock.h"
 #include "core/status_macros.h"
+#include "proto/rpc/deadline.h"
 #include "proto/rpc/grpc_status.h"
 #include "proto/rpc/protocol.h"
 #include "replay/service/service_codec.h"
@@ -21,7 +22,7 @@ namespace {
 template <class Wait>
 absl::Status WaitInSlices(const grpc::ServerContext& context, absl::Time deadline, const Wait& wait) {
   for (;;) {
-    const absl::Time slice = std::min(deadline, absl::Now() + ReplayService::kCancelCheck);
+    const absl::Time slice = std::min(deadline, MonotonicNow() + ReplayService::kCancelCheck);
     const absl::Status status = wait(slice);
     if (status.code() != absl::StatusCode::kDeadlineExceeded || slice == deadline) return status;
     if (context.IsCancelled()) return absl::CancelledError("the client has gone");
@@ -30,8 +31,8 @@ absl::Status WaitInSlices(const grpc::ServerContext& context, absl::Time deadlin
 
 // The time at which a draw must stop waiting, so that its answer comes before the caller's own deadline.
 absl::Time WaitDeadline(const grpc::ServerContext& context, const SampleRequest& request) {
-  const absl::Time now = absl::Now();
-  const absl::Time call_deadline = absl::FromChrono(context.deadline());
+  const absl::Time now = MonotonicNow();
+  const absl::Time call_deadline = DeadlineOf(context);
   const absl::Duration margin = std::min(absl::Milliseconds(100), (call_deadline - now) / 10);
   if (!request.has_wait_s()) return call_deadline - margin;
   const double wait_s = request.wait_s() > 0 ? request.wait_s() : 0;  // not a number: 0
@@ -68,7 +69,7 @@ absl::Status ReplayService::Store(grpc::ServerContext* context, std::uint32_t pl
   const LatencyTimer timer(&insert_latency_);
   std::vector<RowEnd> ends;
   ASSIGN_OR_RETURN(InsertBatch batch, DecodeInsert(request, buffer_->layout(), &ends));
-  return WaitInSlices(*context, absl::FromChrono(context->deadline()),
+  return WaitInSlices(*context, DeadlineOf(*context),
                       [&](absl::Time deadline) { return buffer_->Insert(place, &batch, deadline); });
 }
 

@@ -6,6 +6,7 @@
 #include <map>
 #include <thread>
 
+#include "core/monotonic_clock.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "proto/config/config_file.h"
@@ -292,8 +293,8 @@ TEST_F(ActorTest, StopsWithinItsDeadlineWhileTheReplayServerIsAway) {
   learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
   const auto actor = MakeActor(/*drain_timeout=*/absl::Milliseconds(10));
   RunningActor running(actor.get());
-  const absl::Time deadline = absl::Now() + kLong;
-  while (actor->counters().appended < 500 && absl::Now() < deadline) std::this_thread::yield();
+  const absl::Time deadline = MonotonicNow() + kLong;
+  while (actor->counters().appended < 500 && MonotonicNow() < deadline) std::this_thread::yield();
   const absl::Status status = running.Stop();
   EXPECT_TRUE(status.ok()) << status;
   EXPECT_EQ(actor->counters().appended, 500) << "as many as it may buffer";

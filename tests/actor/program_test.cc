@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "absl/strings/match.h"
-#include "absl/time/clock.h"
 #include "core/check.h"
+#include "core/monotonic_clock.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/actor/learner_double.h"
@@ -80,7 +80,7 @@ class Program {
  private:
   bool ReadMore() {
     pollfd fd = {output_fd_, POLLIN, 0};
-    const absl::Duration left = deadline_ - absl::Now();
+    const absl::Duration left = deadline_ - MonotonicNow();
     if (left <= absl::ZeroDuration() ||
         poll(&fd, 1, static_cast<int>(absl::ToInt64Milliseconds(left)) + 1) <= 0) {
       kill(pid_, SIGKILL);
@@ -92,7 +92,7 @@ class Program {
     return count > 0;
   }
 
-  const absl::Time deadline_ = absl::Now() + kLong;
+  const absl::Time deadline_ = MonotonicNow() + kLong;
   pid_t pid_ = 0;
   int output_fd_ = -1;
   std::string output_;

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
 #include "core/check.h"
+#include "core/monotonic_clock.h"
 #include "core/rng.h"
 #include "replay/buffer/partitioned_buffer.h"
 #include "replay/client/client.h"
@@ -197,9 +197,9 @@ void ReplaySample(benchmark::State& state) {
   DrawnBatches drawn;
   std::vector<double> latencies_us;
   for (auto _ : state) {
-    const absl::Time start = absl::Now();
+    const absl::Time start = MonotonicNow();
     DBR_CHECK(client.Sample({.uniform = kBatch}, kLayout, kTimeout, &drawn).ok());
-    latencies_us.push_back(absl::ToDoubleMicroseconds(absl::Now() - start));
+    latencies_us.push_back(absl::ToDoubleMicroseconds(MonotonicNow() - start));
   }
   state.SetItemsProcessed(state.iterations());  // batches
   std::sort(latencies_us.begin(), latencies_us.end());

@@ -146,7 +146,7 @@ TEST(RoomsTest, FindsEachKindOfViolation) {
   EXPECT_THAT(Violation(rooms, "nn/mlp.cc", "envs/env.h"), HasSubstr("nothing of envs there"));
   EXPECT_THAT(Violation(rooms, "nn/mlp.cc", "grpcpp/grpcpp.h"), HasSubstr("no grpc there"));
   EXPECT_THAT(Violation(rooms, "nn/mlp.cc", "proto/replay.grpc.pb.h"), HasSubstr("no grpc there"));
-  EXPECT_THAT(Violation(rooms, "envs/env.cc", "absl/time/clock.h"), HasSubstr("no clock there"));
+  EXPECT_THAT(Violation(rooms, "envs/env.cc", "core/monotonic_clock.h"), HasSubstr("no clock there"));
   EXPECT_THAT(Violation(rooms, "actor/step_loop.cc", "core/file_io.h"), HasSubstr("no files there"));
   EXPECT_THAT(Violation(rooms, "core/rng.h", "tests/support/temp_dir.h"), HasSubstr("tests are above"));
   EXPECT_THAT(Violation(rooms, "elsewhere/file.cc", "core/rng.h"), HasSubstr("no line for elsewhere"));
@@ -189,6 +189,21 @@ TEST(RoomsTest, DrawsEachRoomAndLeavesOutArrowsThatFollowFromOthers) {
   for (const char* folder : {"core", "nn", "envs", "actor"}) EXPECT_THAT(picture, HasSubstr(folder));
   EXPECT_THAT(picture, HasSubstr("actor -&gt; nn"));
   EXPECT_THAT(picture, testing::Not(HasSubstr("actor -&gt; core")));
+}
+
+// The time of day may be set while a program runs; a wait or a deadline that goes by it then ends at once, or
+// hours late. absl::Now() is for labels, and its header is for the folders that the table allows it in.
+TEST(ClockTest, NoWaitAndNoDeadlineGoesByTheTimeOfDay) {
+  for (const std::string& path : Sources()) {
+    const std::string text = ReadAll(Root() / path);
+    for (const char* word :
+         {"AwaitWithTimeout(", "AwaitWithDeadline(", "LockWhenWith", "WaitForNotificationWith",
+          "WaitWithTimeout(", "WaitWithDeadline(", "SleepFor(", "system_clock", "ToChronoTime("}) {
+      if (path == "core/monotonic_clock.h") continue;  // says what it stands for
+      EXPECT_EQ(text.find(word), std::string::npos)
+          << path << " has " << word << ": use core/monotonic_clock.h, or proto/rpc/deadline.h for a call";
+    }
+  }
 }
 
 }  // namespace

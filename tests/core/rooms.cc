@@ -8,7 +8,7 @@ namespace dbr {
 namespace {
 
 const std::set<std::string>& Words() {
-  static const auto* words = new std::set<std::string>{"grpc", "files", "clock"};
+  static const auto* words = new std::set<std::string>{"grpc", "files", "clock", "date"};
   return *words;
 }
 
@@ -92,10 +92,12 @@ std::string FindCircle(const Rooms& rooms) {
 }
 
 std::string OutsideWorld(const std::string& included) {
-  static const auto* words = new std::map<std::string, std::string>{{"absl/time/clock.h", "clock"},
+  static const auto* words = new std::map<std::string, std::string>{{"absl/time/clock.h", "date"},
                                                                     {"chrono", "clock"},
-                                                                    {"ctime", "clock"},
+                                                                    {"ctime", "date"},
                                                                     {"core/file_io.h", "files"},
+                                                                    {"core/monotonic_clock.h", "clock"},
+                                                                    {"core/stop_flag.h", "clock"},
                                                                     {"core/run_folder.h", "files"},
                                                                     {"core/shutdown.h", "files"},
                                                                     {"fcntl.h", "files"},

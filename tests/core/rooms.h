@@ -10,7 +10,7 @@ namespace dbr {
 
 struct Room {
   std::string folder;
-  std::set<std::string> may_include;  // folders, and the words "grpc", "files" and "clock"
+  std::set<std::string> may_include;  // folders, and the words "grpc", "files", "clock" and "date"
   std::string purpose;
 };
 
@@ -24,8 +24,8 @@ Rooms ParseRooms(const std::string& text, std::vector<std::string>* errors);
 // The folders of a circle of rooms that include each other, "a -> b -> a"; "" where there is none.
 std::string FindCircle(const Rooms& rooms);
 
-// The word that stands for an included header of the outside world ("grpc", "files" or "clock"); "" for every
-// other header.
+// The word that stands for an included header of the outside world ("grpc", "files", "clock" or "date"); ""
+// for every other header.
 std::string OutsideWorld(const std::string& included);
 
 // Why the file at `path` may not include `included`; "" where it may.

@@ -14,9 +14,9 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/numbers.h"
-#include "absl/time/clock.h"
 #include "core/check.h"
 #include "core/file_io.h"
+#include "core/monotonic_clock.h"
 
 namespace dbr {
 namespace {
@@ -27,7 +27,8 @@ int Milliseconds(absl::Duration duration) {
 
 }  // namespace
 
-DbrProcess::DbrProcess(const std::string& program, std::vector<std::string> arguments) {
+DbrProcess::DbrProcess(const std::string& program, std::vector<std::string> arguments,
+                       std::vector<std::string> environment) {
   int ends[2];
   DBR_CHECK(pipe2(ends, O_CLOEXEC) == 0);
   posix_spawn_file_actions_t actions;
@@ -39,12 +40,13 @@ DbrProcess::DbrProcess(const std::string& program, std::vector<std::string> argu
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
   // The program runs without OPENBLAS_NUM_THREADS, as users start it.
-  std::vector<char*> environment;
+  std::vector<char*> entries;
+  for (std::string& entry : environment) entries.push_back(entry.data());
   for (char** entry = environ; *entry != nullptr; ++entry) {
-    if (!absl::StartsWith(*entry, "OPENBLAS_NUM_THREADS=")) environment.push_back(*entry);
+    if (!absl::StartsWith(*entry, "OPENBLAS_NUM_THREADS=")) entries.push_back(*entry);
   }
-  environment.push_back(nullptr);
-  DBR_CHECK(posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), environment.data()) == 0);
+  entries.push_back(nullptr);
+  DBR_CHECK(posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), entries.data()) == 0);
   posix_spawn_file_actions_destroy(&actions);
   close(ends[1]);
   output_fd_ = ends[0];
@@ -69,17 +71,17 @@ DbrProcess::Read DbrProcess::ReadWithin(absl::Duration timeout) {
 }
 
 bool DbrProcess::AwaitOutput(const std::string& words) {
-  const absl::Time deadline = absl::Now() + kPatience;
+  const absl::Time deadline = MonotonicNow() + kPatience;
   while (!absl::StrContains(output_, words)) {
-    if (ReadWithin(deadline - absl::Now()) != Read::kMore) return false;
+    if (ReadWithin(deadline - MonotonicNow()) != Read::kMore) return false;
   }
   return true;
 }
 
 bool DbrProcess::Await(const std::function<bool()>& condition) {
-  const absl::Time deadline = absl::Now() + kPatience;
+  const absl::Time deadline = MonotonicNow() + kPatience;
   while (!condition()) {
-    if (absl::Now() > deadline || ReadWithin(absl::Milliseconds(200)) == Read::kEnd) return false;
+    if (MonotonicNow() > deadline || ReadWithin(absl::Milliseconds(200)) == Read::kEnd) return false;
   }
   return true;
 }
@@ -89,9 +91,9 @@ void DbrProcess::Signal(int number) const {
 }
 
 int DbrProcess::Wait() {
-  const absl::Time deadline = absl::Now() + kPatience;
+  const absl::Time deadline = MonotonicNow() + kPatience;
   for (;;) {
-    const Read read = ReadWithin(deadline - absl::Now());
+    const Read read = ReadWithin(deadline - MonotonicNow());
     if (read == Read::kEnd) break;
     if (read == Read::kNothing) kill(pid_, SIGKILL);
   }
@@ -101,8 +103,9 @@ int DbrProcess::Wait() {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
 }
 
-std::pair<int, std::string> RunProgram(const std::string& program, std::vector<std::string> arguments) {
-  DbrProcess process(program, std::move(arguments));
+std::pair<int, std::string> RunProgram(const std::string& program, std::vector<std::string> arguments,
+                                       std::vector<std::string> environment) {
+  DbrProcess process(program, std::move(arguments), std::move(environment));
   const int status = process.Wait();
   return {status, process.output()};
 }
@@ -120,12 +123,12 @@ std::vector<pid_t> ProcessesOf(const std::string& program, const std::string& wo
 }
 
 bool AllEndWithin(const std::vector<pid_t>& processes, absl::Duration timeout) {
-  const absl::Time deadline = absl::Now() + timeout;
+  const absl::Time deadline = MonotonicNow() + timeout;
   for (const pid_t pid : processes) {
     const int fd = static_cast<int>(syscall(SYS_pidfd_open, pid, 0));
     if (fd < 0) continue;  // the process has ended
     pollfd waiting = {fd, POLLIN, 0};
-    const bool ended = poll(&waiting, 1, Milliseconds(deadline - absl::Now())) == 1;
+    const bool ended = poll(&waiting, 1, Milliseconds(deadline - MonotonicNow())) == 1;
     close(fd);
     if (!ended) return false;
   }

@@ -16,9 +16,12 @@ inline constexpr absl::Duration kPatience = absl::Minutes(5);
 
 // A program of build/bin, or one at an absolute path. The test reads its stdout and stderr. The destructor
 // kills it. One thread at a time.
+//
+// `environment`: "NAME=VALUE" entries that are added to the test's own.
 class DbrProcess {
  public:
-  DbrProcess(const std::string& program, std::vector<std::string> arguments);
+  DbrProcess(const std::string& program, std::vector<std::string> arguments,
+             std::vector<std::string> environment = {});
   ~DbrProcess();
   DbrProcess(const DbrProcess&) = delete;
   DbrProcess& operator=(const DbrProcess&) = delete;
@@ -49,7 +52,8 @@ class DbrProcess {
 };
 
 // Runs a program to its end. Returns {exit status, output}.
-std::pair<int, std::string> RunProgram(const std::string& program, std::vector<std::string> arguments);
+std::pair<int, std::string> RunProgram(const std::string& program, std::vector<std::string> arguments,
+                                       std::vector<std::string> environment = {});
 
 // Returns the processes whose command line holds both texts. Reads /proc.
 std::vector<pid_t> ProcessesOf(const std::string& program, const std::string& words);

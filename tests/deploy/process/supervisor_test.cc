@@ -17,8 +17,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
-#include "absl/time/clock.h"
 #include "core/file_io.h"
+#include "core/monotonic_clock.h"
 #include "deploy/process/child_process.h"
 #include "deploy/process/log_tail.h"
 #include "tests/support/temp_dir.h"
@@ -58,9 +58,9 @@ class SupervisorTest : public testing::Test {
 
   // Waits until the supervision fails, for at most kLong.
   static absl::Status Fail(Supervisor* supervisor) {
-    const absl::Time deadline = absl::Now() + kLong;
+    const absl::Time deadline = MonotonicNow() + kLong;
     absl::Status status;
-    while (status.ok() && absl::Now() < deadline) status = supervisor->Wait(deadline);
+    while (status.ok() && MonotonicNow() < deadline) status = supervisor->Wait(deadline);
     return status;
   }
 
@@ -124,7 +124,7 @@ TEST_F(SupervisorTest, RestartsAChildThatDiesAndGivesUpWithItsFirstFailure) {
 TEST_F(SupervisorTest, NamesTheProcessThatFailedFirst) {
   const auto supervisor = Make({.max_restarts = 1});
   ASSERT_TRUE(supervisor->Start(Child("replay", {"say", "disk full", "exit", "1"})).ok());
-  while (supervisor->restarts() == 0) ASSERT_TRUE(supervisor->Wait(absl::Now() + kLong).ok());
+  while (supervisor->restarts() == 0) ASSERT_TRUE(supervisor->Wait(MonotonicNow() + kLong).ok());
   ASSERT_TRUE(supervisor->Start(Child("actor-0", {"say", "no replay", "exit", "1"})).ok());
   const absl::Status status = Fail(supervisor.get());
   EXPECT_THAT(std::string(status.message()), HasSubstr("First failure: replay exited with status 1"));
@@ -255,8 +255,8 @@ TEST_F(SupervisorTest, TellsHowThoseThatRunOnceEndedAndStartsThemNoMore) {
     ASSERT_TRUE(supervisor->Start(spec).ok());
   }
   std::vector<std::pair<std::string, std::string>> ends;
-  const absl::Time deadline = absl::Now() + kLong;
-  while (ends.size() < 2 && absl::Now() < deadline) {
+  const absl::Time deadline = MonotonicNow() + kLong;
+  while (ends.size() < 2 && MonotonicNow() < deadline) {
     ASSERT_TRUE(supervisor->Wait(deadline).ok());
     for (const EndedProcess& ended : supervisor->TakeEnded())
       ends.emplace_back(ended.name, DescribeExit(ended.wait_status));

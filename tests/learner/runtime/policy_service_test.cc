@@ -6,6 +6,7 @@
 
 #include "proto/rpc/channel.h"
 #include "proto/rpc/codec.h"
+#include "proto/rpc/deadline.h"
 #include "proto/rpc/learner_client.h"
 #include "proto/rpc/protocol.h"
 #include "proto/rpc/server.h"

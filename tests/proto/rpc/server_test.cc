@@ -15,6 +15,7 @@
 #include "proto/health.grpc.pb.h"
 #include "proto/replay.grpc.pb.h"
 #include "proto/rpc/channel.h"
+#include "proto/rpc/deadline.h"
 #include "tests/support/temp_dir.h"
 
 namespace dbr {

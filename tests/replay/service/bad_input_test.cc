@@ -14,6 +14,7 @@
 #include "proto/replay.grpc.pb.h"
 #include "proto/rpc/channel.h"
 #include "proto/rpc/codec.h"
+#include "proto/rpc/deadline.h"
 #include "proto/rpc/protocol.h"
 #include "replay/client/client.h"
 #include "replay/service/replay_server.h"

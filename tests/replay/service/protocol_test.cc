@@ -10,9 +10,10 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
-#include "absl/synchronization/notification.h"
+#include "core/stop_flag.h"
 #include "proto/replay.grpc.pb.h"
 #include "proto/rpc/channel.h"
+#include "proto/rpc/deadline.h"
 #include "proto/rpc/server.h"
 #include "replay/client/await_stats.h"
 #include "replay/client/client.h"
@@ -169,7 +170,7 @@ TEST_F(ProtocolOverSocket, ClientsRefuseAServerOfAnotherVersionForGood) {
     EXPECT_THAT(std::string(stats.message()),
                 HasSubstr(version == kBefore ? "the replay server is older than this program"
                                              : "this program is older than the replay server"));
-    const absl::Notification never;
+    const StopFlag never;
     EXPECT_EQ(AwaitStats(&client, "for this test", never).status(), stats);
     EXPECT_EQ(other.questions(), 2);
   }

@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "absl/strings/str_cat.h"
+#include "core/stop_flag.h"
 #include "proto/rpc/channel.h"
 #include "proto/rpc/codec.h"
 #include "proto/rpc/grpc_status.h"
@@ -300,7 +301,7 @@ TEST_F(ReplayOverSocket, StatsTellWhoIsBlockedAndWhy) {
 }
 
 TEST_F(ReplayOverSocket, StatisticsAreAwaitedUntilThereIsAServer) {
-  const absl::Notification never;
+  const StopFlag never;
   std::thread process([&] {
     ReplayClient client(options_.server.address);
     const auto stats = AwaitStats(&client, "for this test", never);
@@ -312,14 +313,14 @@ TEST_F(ReplayOverSocket, StatisticsAreAwaitedUntilThereIsAServer) {
 
 TEST_F(ReplayOverSocket, AwaitingStatisticsEndsWithTheProcessAndBeforeAnotherProgram) {
   ReplayClient client(options_.server.address);
-  absl::Notification stopping;
+  StopFlag stopping;
   std::thread process(
       [&] { EXPECT_TRUE(absl::IsCancelled(AwaitStats(&client, "for this test", stopping).status())); });
-  stopping.Notify();
+  stopping.Set();
   process.join();
   const auto another = dbr::StartServer(options_.server, {});
   ASSERT_TRUE(another.ok()) << another.status();
-  const absl::Notification never;
+  const StopFlag never;
   EXPECT_TRUE(absl::IsUnimplemented(AwaitStats(&client, "for this test", never).status()));
 }
 
