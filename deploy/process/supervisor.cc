@@ -222,15 +222,24 @@ bool Supervisor::Stop(int last_rank) {
 
 bool Supervisor::StopRank(int rank) {
   absl::Time deadline = absl::InfinitePast();
+  bool clean = true;
   for (const auto& child : children_) {
-    child->restart_at = absl::InfiniteFuture();
-    if (child->spec.stop_rank != rank || child->pid == 0) continue;
+    if (child->spec.stop_rank != rank) continue;
+    if (child->restart_at != absl::InfiniteFuture()) {
+      // It died of something else and was to be started again, so that nothing was saved.
+      clean = false;
+      child->restart_at = absl::InfiniteFuture();
+      options_.on_event(
+          absl::StrCat(child->spec.name, " had died and is not started again, for all is stopped: ",
+                       "what it did after it last saved is lost"),
+          /*notable=*/true);
+    }
+    if (child->pid == 0) continue;
     kill(child->pid, SIGTERM);
     deadline = std::max(deadline, MonotonicNow() + child->spec.stop_grace);
   }
   const int signals_before = stop_signals_;
   bool killed = false;
-  bool clean = true;
   while (ReapStopped(rank, &clean)) {
     Poll(deadline);
     const bool interrupted = stop_signals_ != signals_before;

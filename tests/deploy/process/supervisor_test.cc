@@ -38,7 +38,8 @@ constexpr absl::Duration kLong = absl::Seconds(60);  // reached only where somet
 class SupervisorTest : public testing::Test {
  protected:
   std::unique_ptr<Supervisor> Make(SupervisorOptions options = {}) {
-    options.first_restart_delay = absl::Milliseconds(1);
+    if (options.first_restart_delay == SupervisorOptions().first_restart_delay)
+      options.first_restart_delay = absl::Milliseconds(1);
     options.on_event = [this](const std::string& event, bool notable) {
       if (notable) events_.push_back(event);
     };
@@ -129,6 +130,19 @@ TEST_F(SupervisorTest, NamesTheProcessThatFailedFirst) {
   const absl::Status status = Fail(supervisor.get());
   EXPECT_THAT(std::string(status.message()), HasSubstr("First failure: replay exited with status 1"));
   EXPECT_THAT(std::string(status.message()), HasSubstr("disk full"));
+}
+
+// It saved nothing when it died, so that not everything is saved when all is stopped.
+TEST_F(SupervisorTest, AChildThatWaitsForItsRestartDoesNotEndCleanly) {
+  SupervisorOptions options;
+  options.first_restart_delay = absl::Hours(1);
+  const auto supervisor = Make(std::move(options));
+  ASSERT_TRUE(supervisor->Start(Child("learner", {"exit", "1"})).ok());
+  while (events_.empty()) ASSERT_TRUE(supervisor->Wait(MonotonicNow() + kLong).ok());
+  EXPECT_THAT(events_, ElementsAre(HasSubstr("learner exited with status 1: starting it again")));
+  EXPECT_FALSE(supervisor->Stop());
+  EXPECT_THAT(events_.back(), HasSubstr("learner had died and is not started again"));
+  EXPECT_TRUE(supervisor->Stop()) << "it is told once";
 }
 
 TEST_F(SupervisorTest, AddsTheRestartArgumentsWhenItStartsAgain) {
