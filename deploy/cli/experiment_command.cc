@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <cstdio>
@@ -17,6 +19,7 @@
 #include "deploy/experiment/grid.h"
 #include "deploy/experiment/run.h"
 #include "deploy/experiment/schedule.h"
+#include "deploy/terminal/output.h"
 #include "deploy/terminal/terminal.h"
 #include "proto/config/experiment_file.h"
 
@@ -72,7 +75,8 @@ absl::StatusOr<int> RunExperiment(const ExperimentFlags& flags) {
   ExperimentOptions options = flags.run;
   ASSIGN_OR_RETURN(options.programs, ProgramsFolder());
   options.capacity.cores = static_cast<int>(std::thread::hardware_concurrency());
-  return ExperimentRun(std::move(grid), std::move(options), stdout).Run();
+  Output out(STDOUT_FILENO);
+  return ExperimentRun(std::move(grid), std::move(options), &out).Run();
 }
 
 void AddChoices(CLI::App* command, ExperimentFlags* flags) {

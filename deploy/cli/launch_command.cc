@@ -1,3 +1,5 @@
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <cstdio>
@@ -14,6 +16,7 @@
 #include "deploy/cli/shipped_file.h"
 #include "deploy/launch/launch.h"
 #include "deploy/launch/run_plan.h"
+#include "deploy/terminal/output.h"
 
 namespace dbr {
 namespace {
@@ -31,7 +34,8 @@ absl::StatusOr<int> RunLaunch(const LaunchFlags& flags) {
   }
   ASSIGN_OR_RETURN(const std::string programs, ProgramsFolder());
   ASSIGN_OR_RETURN(RunPlan plan, PrepareRun(options, absl::Now()));
-  ASSIGN_OR_RETURN(const std::unique_ptr<Launch> launch, Launch::Create(std::move(plan), programs, stdout));
+  Output out(STDOUT_FILENO);
+  ASSIGN_OR_RETURN(const std::unique_ptr<Launch> launch, Launch::Create(std::move(plan), programs, &out));
   return launch->Run();
 }
 

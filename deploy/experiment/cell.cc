@@ -11,7 +11,7 @@
 #include "core/file_io.h"
 #include "core/run_folder.h"
 #include "core/status_macros.h"
-#include "deploy/launch/run_plan.h"
+#include "deploy/launch/folder_claim.h"
 #include "deploy/launch/same_run.h"
 #include "deploy/launch/summary_reader.h"
 #include "deploy/terminal/terminal.h"
@@ -36,10 +36,6 @@ std::string DifferenceFrom(const Cell& cell) {
   for (const absl::string_view line : absl::StrSplit(difference, '\n', absl::SkipEmpty()))
     absl::StrAppend(&indented, "    ", line, "\n");
   return indented;
-}
-
-bool InUse(const RunFolder& folder) {
-  return absl::IsFailedPrecondition(RunFolderLock::Take(folder).status());
 }
 
 CellState StateIn(const RunFolder& folder, const RunSummary& summary) {
@@ -69,7 +65,7 @@ CellStanding ReadStanding(const Cell& cell) {
   if (!Exists(folder.config())) return standing;
   standing.summary = ReadSummary(folder);
   standing.difference = DifferenceFrom(cell);
-  if (InUse(folder)) {
+  if (IsInUse(folder)) {
     standing.state = CellState::kBusy;
   } else if (!standing.difference.empty()) {
     standing.state = CellState::kChanged;

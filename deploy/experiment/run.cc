@@ -39,7 +39,7 @@ absl::Status CheckSeedBufferIsThere(const Cell& cell) {
 
 }  // namespace
 
-ExperimentRun::ExperimentRun(Grid grid, ExperimentOptions options, std::FILE* out)
+ExperimentRun::ExperimentRun(Grid grid, ExperimentOptions options, Output* out)
     : title_(absl::StrCat("experiment ", grid.name, " at scale ", grid.scale)),
       run_dir_(grid.run_dir),
       options_(std::move(options)),

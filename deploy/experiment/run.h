@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -35,7 +34,7 @@ struct ExperimentOptions {
 // it.
 class ExperimentRun {
  public:
-  ExperimentRun(Grid grid, ExperimentOptions options, std::FILE* out);
+  ExperimentRun(Grid grid, ExperimentOptions options, Output* out);
 
   // Starts `dbr launch` for each cell that is not done, as many at once as the capacity has room for, until
   // all are over or a signal comes, upon which the running ones are told to save and stop. Blocks. Returns

@@ -61,42 +61,38 @@ std::vector<std::string> StatusLines(const GridStatus& state, int width, int hei
   return lines;
 }
 
-StatusScreen::StatusScreen(std::FILE* out, absl::Duration every)
-    : out_(out), terminal_(IsTerminal(fileno(out))), every_(every) {}
+StatusScreen::StatusScreen(Output* out, absl::Duration every)
+    : out_(out), terminal_(IsTerminal(out->fd())), every_(every) {}
 
 void StatusScreen::Update(const GridStatus& state, absl::Time now) {
+  if (out_->behind()) return;  // a newer state will follow
   if (terminal_) {
     // A cell and a line are left free: some terminals wrap or scroll when the last one is written.
-    Erase();
-    lines_ = StatusLines(state, TerminalWidth(fileno(out_), 80) - 1, TerminalHeight(fileno(out_), 24) - 1);
-    Draw();
+    const std::string erase = EraseText();
+    lines_ = StatusLines(state, TerminalWidth(out_->fd(), 80) - 1, TerminalHeight(out_->fd(), 24) - 1);
+    out_->Write(absl::StrCat(erase, LinesText()));
   } else {
     if (now - last_ < every_) return;
     last_ = now;
-    std::fprintf(out_, "%s\n", OneLine(state).c_str());
+    out_->Write(absl::StrCat(OneLine(state), "\n"));
   }
-  std::fflush(out_);
 }
 
 void StatusScreen::Say(const std::string& text) {
-  Erase();
-  std::fprintf(out_, "%s\n", text.c_str());
-  Draw();
-  std::fflush(out_);
+  out_->Write(absl::StrCat(EraseText(), text, "\n", LinesText()));
 }
 
 void StatusScreen::End() {
-  Erase();
+  out_->Write(EraseText());
   lines_.clear();
-  std::fflush(out_);
 }
 
-void StatusScreen::Erase() {
-  if (!lines_.empty()) std::fprintf(out_, "\033[%zuA\r\033[J", lines_.size());
+std::string StatusScreen::EraseText() const {
+  return lines_.empty() ? "" : absl::StrCat("\033[", lines_.size(), "A\r\033[J");
 }
 
-void StatusScreen::Draw() {
-  for (const std::string& line : lines_) std::fprintf(out_, "%s\n", line.c_str());
+std::string StatusScreen::LinesText() const {
+  return lines_.empty() ? "" : absl::StrCat(absl::StrJoin(lines_, "\n"), "\n");
 }
 
 }  // namespace dbr

@@ -1,13 +1,13 @@
 // How a grid of runs is going, on a terminal or as lines of a log.
 #pragma once
 
-#include <cstdio>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/time/time.h"
 #include "deploy/experiment/progress.h"
+#include "deploy/terminal/output.h"
 
 namespace dbr {
 
@@ -34,11 +34,11 @@ std::string StatusTotals(const GridStatus& state);
 std::vector<std::string> StatusLines(const GridStatus& state, int width, int height);
 
 // Keeps the status in place at the bottom of a terminal; where the output is none, writes the totals and how
-// far each running cell is as one line now and then. One thread. The stream must outlive it.
+// far each running cell is as one line now and then. One thread. The output must outlive it.
 class StatusScreen {
  public:
   // `every`: how often at most a line is written where `out` is no terminal.
-  StatusScreen(std::FILE* out, absl::Duration every);
+  StatusScreen(Output* out, absl::Duration every);
 
   void Update(const GridStatus& state, absl::Time now);
   // Writes lines of their own above the status.
@@ -47,10 +47,10 @@ class StatusScreen {
   void End();
 
  private:
-  void Erase();
-  void Draw();
+  std::string EraseText() const;
+  std::string LinesText() const;
 
-  std::FILE* const out_;
+  Output* const out_;
   const bool terminal_;
   const absl::Duration every_;
   absl::Time last_ = absl::InfinitePast();

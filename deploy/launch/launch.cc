@@ -70,7 +70,7 @@ RunSummary BeginSummary(const RunPlan& plan) {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Launch>> Launch::Create(RunPlan plan, std::string programs, std::FILE* out) {
+absl::StatusOr<std::unique_ptr<Launch>> Launch::Create(RunPlan plan, std::string programs, Output* out) {
   std::shared_ptr<spdlog::logger> log;
   try {
     log = std::make_shared<spdlog::logger>(
@@ -82,7 +82,7 @@ absl::StatusOr<std::unique_ptr<Launch>> Launch::Create(RunPlan plan, std::string
   return std::unique_ptr<Launch>(new Launch(std::move(plan), std::move(programs), out, std::move(log)));
 }
 
-Launch::Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_ptr<spdlog::logger> log)
+Launch::Launch(RunPlan plan, std::string programs, Output* out, std::shared_ptr<spdlog::logger> log)
     : plan_(std::move(plan)),
       programs_(std::move(programs)),
       log_(std::move(log)),
@@ -97,6 +97,7 @@ absl::StatusOr<int> Launch::Run() {
   Announce();
   watch_.Start(MonotonicNow());
   absl::Status status = StartAll();
+  if (!plan_.claim->has_begun()) return GiveUp(status);
   if (status.ok()) status = Train();
   line_.End();
   if (status.ok()) Say("stopping, and saving everything");
@@ -121,6 +122,23 @@ absl::StatusOr<int> Launch::Run() {
   }
   Say(absl::StrCat("run folder: ", plan_.folder.root));
   return interrupted ? kInterruptedExit : 0;
+}
+
+absl::StatusOr<int> Launch::GiveUp(const absl::Status& why) {
+  line_.End();
+  StopAll(/*ask=*/false);
+  plan_.claim->Withdraw();
+  if (!plan_.resume) {
+    why.ok() ? watch_.Interrupt() : watch_.Fail(why);
+    SaveSummary();
+  }
+  if (!why.ok()) {
+    log_->error("{}", std::string(why.message()));
+    return why;
+  }
+  Say(absl::StrCat("stopped before the run ", plan_.resume ? "went on: nothing of it has changed" : "began",
+                   "; the same command starts it\nrun folder: ", plan_.folder.root));
+  return kInterruptedExit;
 }
 
 void Launch::Announce() {
@@ -150,6 +168,7 @@ absl::Status Launch::StartAll() {
     if (name == "learner") RETURN_IF_ERROR(WaitUntilServing(name, plan_.learner_address, kServingWithin));
     if (supervisor_->stop_signals() > 0) return absl::OkStatus();
   }
+  RETURN_IF_ERROR(plan_.claim->Begin());
   if (summary().offline_updates == 0) RETURN_IF_ERROR(StartActors());
   supervisor_->set_restarting(true);
   monitor_ = std::make_unique<RunMonitor>(plan_.replay_address, plan_.learner_address, kAskEvery,

@@ -3,7 +3,6 @@
 
 #include <spdlog/logger.h>
 
-#include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,6 +16,7 @@
 #include "deploy/launch/run_summary.h"
 #include "deploy/launch/run_watch.h"
 #include "deploy/process/supervisor.h"
+#include "deploy/terminal/output.h"
 #include "envs/presentation.h"
 
 namespace dbr {
@@ -26,7 +26,7 @@ namespace dbr {
 class Launch {
  public:
   // `programs`: the folder of dbr-replay, dbr-learner and dbr-actor. Internal where the log cannot be opened.
-  static absl::StatusOr<std::unique_ptr<Launch>> Create(RunPlan plan, std::string programs, std::FILE* out);
+  static absl::StatusOr<std::unique_ptr<Launch>> Create(RunPlan plan, std::string programs, Output* out);
 
   // Starts everything (the actors after the offline phase), trains until a limit of the config or a signal,
   // stops everything with its state saved, and evaluates the last policy. Blocks. Returns the exit status, 0
@@ -34,13 +34,16 @@ class Launch {
   absl::StatusOr<int> Run();
 
  private:
-  Launch(RunPlan plan, std::string programs, std::FILE* out, std::shared_ptr<spdlog::logger> log);
+  Launch(RunPlan plan, std::string programs, Output* out, std::shared_ptr<spdlog::logger> log);
   const RunSummary& summary() const { return watch_.summary(); }
   const EnvPresentation& presentation() const;
 
   void Announce();
-  // Services, and actors where there is no offline phase. OK also where a stop signal came first.
+  // Services, and actors where there is no offline phase. Once the services serve, the run folder is this
+  // launch's (FolderClaim::Begin). OK also where a stop signal came first.
   absl::Status StartAll();
+  // The end of a launch whose services never served, of an error or (OK) a stop signal.
+  absl::StatusOr<int> GiveUp(const absl::Status& why);
   absl::Status StartActors();
   absl::Status WaitUntilServing(const std::string& name, const std::string& address, absl::Duration within);
   void TellOfTheSeedBuffer();

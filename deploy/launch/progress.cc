@@ -108,39 +108,33 @@ std::string ProgressText(const Progress& progress, int width) {
   return Truncate(Line(progress, /*words=*/false), width);
 }
 
-ProgressLine::ProgressLine(std::FILE* out, absl::Duration every)
-    : out_(out), terminal_(IsTerminal(fileno(out))), every_(every) {}
+ProgressLine::ProgressLine(Output* out, absl::Duration every)
+    : out_(out), terminal_(IsTerminal(out->fd())), every_(every) {}
 
 ProgressLine::~ProgressLine() {
   End();
 }
 
 void ProgressLine::Update(const Progress& progress, absl::Time now) {
+  if (out_->behind()) return;  // a newer line will follow
   if (terminal_) {
     // One cell is left free: some terminals wrap when the last one is written.
-    live_ = ProgressText(progress, TerminalWidth(fileno(out_), 80) - 1);
-    std::fprintf(out_, "\r%s\033[K", live_.c_str());
+    live_ = ProgressText(progress, TerminalWidth(out_->fd(), 80) - 1);
+    out_->Write(absl::StrCat("\r", live_, "\033[K"));
   } else {
     if (now - last_ < every_) return;
     last_ = now;
-    std::fprintf(out_, "%s\n", ProgressText(progress, kWidthWithoutTerminal).c_str());
+    out_->Write(absl::StrCat(ProgressText(progress, kWidthWithoutTerminal), "\n"));
   }
-  std::fflush(out_);
 }
 
 void ProgressLine::Say(const std::string& text) {
-  if (live_.empty()) {
-    std::fprintf(out_, "%s\n", text.c_str());
-  } else {
-    std::fprintf(out_, "\r\033[K%s\n%s", text.c_str(), live_.c_str());
-  }
-  std::fflush(out_);
+  out_->Write(live_.empty() ? absl::StrCat(text, "\n") : absl::StrCat("\r\033[K", text, "\n", live_));
 }
 
 void ProgressLine::End() {
   if (live_.empty()) return;
-  std::fputc('\n', out_);
-  std::fflush(out_);
+  out_->Write("\n");
   live_.clear();
 }
 

@@ -2,12 +2,12 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
 #include <optional>
 #include <string>
 
 #include "absl/time/time.h"
 #include "deploy/launch/monitor.h"
+#include "deploy/terminal/output.h"
 #include "envs/presentation.h"
 
 namespace dbr {
@@ -28,11 +28,11 @@ struct Progress {
 std::string ProgressText(const Progress& progress, int width);
 
 // Keeps the line in place on a terminal; where the output is none, writes it now and then. One thread. The
-// stream must outlive it.
+// output must outlive it.
 class ProgressLine {
  public:
   // `every`: how often at most a line is written where `out` is no terminal.
-  ProgressLine(std::FILE* out, absl::Duration every);
+  ProgressLine(Output* out, absl::Duration every);
   ~ProgressLine();  // ends the line
 
   void Update(const Progress& progress, absl::Time now);
@@ -42,7 +42,7 @@ class ProgressLine {
   void End();
 
  private:
-  std::FILE* const out_;
+  Output* const out_;
   const bool terminal_;
   const absl::Duration every_;
   absl::Time last_ = absl::InfinitePast();

@@ -1,11 +1,6 @@
 #include "deploy/launch/run_plan.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <filesystem>
 #include <thread>
 #include <utility>
@@ -14,9 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "actor/evaluator.h"
 #include "actor/exploration.h"
-#include "core/file_io.h"
 #include "core/status_macros.h"
-#include "deploy/launch/results.h"
 #include "deploy/launch/same_run.h"
 #include "envs/env.h"
 #include "envs/registry/registry.h"
@@ -29,11 +22,9 @@
 namespace dbr {
 namespace {
 
-// An address that the launcher can hand to others before the server listens.
-absl::StatusOr<std::string> Address(const std::string& configured, const std::string& otherwise,
-                                    const char* field) {
-  if (configured.empty()) return otherwise;
-  if (!absl::EndsWith(configured, ":0")) return configured;
+// The launcher tells others the address before the server listens.
+absl::Status CheckAddress(const std::string& configured, const char* field) {
+  if (!absl::EndsWith(configured, ":0")) return absl::OkStatus();
   return absl::InvalidArgumentError(
       absl::StrCat(field, ": expected an address that the other processes can be told, found '", configured,
                    "'. Name a port, or leave it out for a unix socket."));
@@ -44,13 +35,11 @@ std::string DefaultRunDir(const Config& config, absl::Time now) {
                       absl::FormatTime("%Y%m%d-%H%M%S", now, absl::LocalTimeZone()));
 }
 
-absl::Status MakeFolder(const RunFolder& folder) {
-  for (const std::string& path : {folder.root, folder.logs(), folder.checkpoints(), folder.policies()}) {
-    std::error_code error;
-    std::filesystem::create_directories(path, error);
-    if (error) return ErrnoStatus(error.value(), "cannot create", path);
-  }
-  return absl::OkStatus();
+absl::StatusOr<std::unique_ptr<FolderClaim>> Claim(const LaunchOptions& options, const Config& config,
+                                                   absl::Time now) {
+  if (options.resume) return FolderClaim::OfRun(options.run_dir);
+  return options.run_dir.empty() ? FolderClaim::NewOfName(DefaultRunDir(config, now))
+                                 : FolderClaim::New(options.run_dir);
 }
 
 absl::StatusOr<Config> LoadNamed(const LaunchOptions& options) {
@@ -117,16 +106,9 @@ absl::Status CheckEpisodes(const char* field, std::uint32_t episodes) {
       absl::StrCat(field, ": expected 1 to ", kMaxEpisodes, ", found ", episodes));
 }
 
-// Whether there is anything that a launch could go on with.
-bool HasBegun(const RunFolder& folder) {
-  std::error_code ignored;
-  return std::filesystem::exists(folder.replay_store(), ignored) ||
-         (std::filesystem::exists(folder.checkpoints(), ignored) &&
-          !std::filesystem::is_empty(folder.checkpoints(), ignored));
-}
-
 absl::Status CheckRunFolder(const RunFolder& folder) {
-  if (std::filesystem::exists(folder.config())) return absl::OkStatus();
+  std::error_code unreadable;
+  if (std::filesystem::exists(folder.config(), unreadable)) return absl::OkStatus();
   return absl::NotFoundError(absl::StrCat("--resume: '", folder.root,
                                           "' is no run folder: it has no config.textproto. ",
                                           "Name the folder that an earlier launch printed."));
@@ -145,7 +127,7 @@ ProcessSpec MakeProcess(const RunPlan& plan, const std::string& programs, const 
   ProcessSpec process;
   process.name = name;
   process.log = plan.folder.log(name);
-  process.command = {absl::StrCat(programs, "/", program), "--config", plan.folder.config(), "--run-dir",
+  process.command = {absl::StrCat(programs, "/", program), "--config", plan.claim->config_path(), "--run-dir",
                      plan.folder.root};
   process.command.insert(process.command.end(), arguments.begin(), arguments.end());
   process.stop_rank = rank;
@@ -161,22 +143,6 @@ ProcessSpec MakeActor(const RunPlan& plan, const std::string& programs, const st
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<RunFolderLock>> RunFolderLock::Take(const RunFolder& folder) {
-  const int fd = open(folder.root.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return ErrnoStatus(errno, "cannot open", folder.root);
-  if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
-    close(fd);
-    return absl::FailedPreconditionError(
-        absl::StrCat("run folder '", folder.root,
-                     "' is in use by another launch. Wait for it or choose another --run-dir."));
-  }
-  return std::unique_ptr<RunFolderLock>(new RunFolderLock(fd));
-}
-
-RunFolderLock::~RunFolderLock() {
-  close(fd_);
-}
-
 absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now) {
   RunPlan plan;
   if (options.resume && options.run_dir.empty()) {
@@ -186,28 +152,21 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
   ASSIGN_OR_RETURN(plan.config, LoadForLaunch(options));
   ASSIGN_OR_RETURN(plan.env, EnvSpecOf(plan.config));
   RETURN_IF_ERROR(CheckFits(plan.config, plan.env));
-  plan.folder.root = options.run_dir.empty() ? DefaultRunDir(plan.config, now) : options.run_dir;
+  const ReplayConfig& replay = plan.config.replay();
+  const LearnerConfig& learner = plan.config.learner();
+  RETURN_IF_ERROR(CheckAddress(replay.address(), "replay.address"));
+  RETURN_IF_ERROR(CheckAddress(learner.address(), "learner.address"));
+  if (!options.resume || !HasBegun({options.run_dir}))
+    RETURN_IF_ERROR(CheckSeedBuffer(plan.config, plan.env));
+  ASSIGN_OR_RETURN(plan.claim, Claim(options, plan.config, now));
+  plan.folder = plan.claim->folder();
+  plan.resume = !plan.claim->is_new();
+  if (plan.resume) RETURN_IF_ERROR(CheckResumable(plan.folder, plan.config));
   plan.config_source = options.config.empty() ? plan.folder.config() : options.config;
-  plan.resume = options.resume && HasBegun(plan.folder);
-  if (plan.resume) {
-    RETURN_IF_ERROR(CheckResumable(plan.folder, plan.config));
-  } else if (!options.resume && std::filesystem::exists(plan.folder.root) &&
-             !std::filesystem::is_empty(plan.folder.root)) {
-    return absl::AlreadyExistsError(
-        absl::StrCat("run folder '", plan.folder.root,
-                     "' exists already. Say --resume to continue it, or choose another --run-dir."));
-  }
-  ASSIGN_OR_RETURN(plan.replay_address,
-                   Address(plan.config.replay().address(), plan.folder.replay_address(), "replay.address"));
-  ASSIGN_OR_RETURN(plan.learner_address, Address(plan.config.learner().address(),
-                                                 plan.folder.learner_address(), "learner.address"));
-  if (!plan.resume) RETURN_IF_ERROR(CheckSeedBuffer(plan.config, plan.env));
+  plan.replay_address = replay.address().empty() ? plan.folder.replay_address() : replay.address();
+  plan.learner_address = learner.address().empty() ? plan.folder.learner_address() : learner.address();
   plan.actors = ActorProcesses(plan.config);
-  RETURN_IF_ERROR(MakeFolder(plan.folder));
-  ASSIGN_OR_RETURN(plan.lock, RunFolderLock::Take(plan.folder));
-  std::error_code none_there;
-  std::filesystem::remove(ResultsPath(plan.folder), none_there);  // of the launch that this one continues
-  RETURN_IF_ERROR(WriteFileAtomically(plan.folder.config(), PrintConfig(plan.config)));
+  RETURN_IF_ERROR(plan.claim->PutConfig(plan.config));
   return plan;
 }
 

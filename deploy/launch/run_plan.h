@@ -10,6 +10,7 @@
 #include "absl/time/time.h"
 #include "core/run_folder.h"
 #include "core/space.h"
+#include "deploy/launch/folder_claim.h"
 #include "deploy/process/supervisor.h"
 #include "proto/config.pb.h"
 
@@ -25,19 +26,6 @@ struct LaunchOptions {
   bool resume = false;
 };
 
-// The right to use a run folder. It is given back when the object is destroyed, or by the kernel when the
-// process dies.
-class RunFolderLock {
- public:
-  // FailedPrecondition where another launch uses the folder.
-  static absl::StatusOr<std::unique_ptr<RunFolderLock>> Take(const RunFolder& folder);
-  ~RunFolderLock();
-
- private:
-  explicit RunFolderLock(int fd) : fd_(fd) {}
-  int fd_;
-};
-
 struct RunPlan {
   Config config;
   std::string config_source;  // the file that the config came from
@@ -47,11 +35,12 @@ struct RunPlan {
   int actors = 1;  // 0: all training is offline
   std::string replay_address;
   std::string learner_address;
-  std::unique_ptr<RunFolderLock> lock;
+  std::unique_ptr<FolderClaim> claim;
 };
 
-// Loads and checks the config, makes the folder or checks that the run in it can be continued, and writes the
-// effective config. With `resume`, a folder whose run has nothing to go on with yet is begun anew. Errors:
+// Loads and checks the config, makes the folder or checks that the run in it can be continued, claims it, and
+// puts the effective config there. With `resume`, a folder whose run has nothing to go on with yet is begun
+// anew; where there is something, nothing of it is changed before FolderClaim::Begin(). Errors:
 // InvalidArgument for a bad config or seed buffer, for what does not fit the environment (CheckFits), and for
 // a config that differs from the folder's where that would not continue the same run (each field is named);
 // AlreadyExists where the folder is there and `resume` was not said; NotFound where there is nothing to

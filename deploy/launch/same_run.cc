@@ -22,6 +22,7 @@ Config Identity(const Config& config) {
   identity.mutable_algorithm()->clear_final_learning_rate();
   identity.mutable_algorithm()->clear_threads();
   identity.mutable_replay()->set_capacity(whole.replay().capacity());
+  identity.mutable_replay()->set_byte_budget(whole.replay().byte_budget());
   *identity.mutable_replay()->mutable_seed_buffer() = whole.replay().seed_buffer();
   identity.mutable_replay()->mutable_seed_buffer()->clear_share();
   return identity;

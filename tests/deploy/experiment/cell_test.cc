@@ -131,7 +131,7 @@ TEST_F(CellTest, FieldsWithoutInfluenceAndWrittenDefaultsMakeNoOtherConfig) {
 
 TEST_F(CellTest, AtWhichAnotherLaunchIsAtWorkIsBusy) {
   MakeRun(cell_.config, RunEnding::kRunning);
-  const auto lock = RunFolderLock::Take(run());
+  const auto lock = FolderClaim::OfRun(run().root);
   ASSERT_TRUE(lock.ok()) << lock.status();
   EXPECT_EQ(State(), CellState::kBusy);
 }

@@ -187,12 +187,15 @@ TEST(StatusScreenTest, KeepsWithinTheTerminal) {
 TEST(StatusScreenTest, WritesALineNowAndThenWhereThereIsNoTerminal) {
   std::FILE* file = std::tmpfile();
   const absl::Time start = absl::FromUnixSeconds(1000);
-  StatusScreen screen(file, absl::Minutes(1));
-  screen.Update(TwoRunning(), start);
-  screen.Say("done x");
-  screen.Update(TwoRunning(), start + absl::Seconds(59));
-  screen.Update(TwoRunning(), start + absl::Seconds(61));
-  screen.End();
+  {
+    Output out(fileno(file));
+    StatusScreen screen(&out, absl::Minutes(1));
+    screen.Update(TwoRunning(), start);
+    screen.Say("done x");
+    screen.Update(TwoRunning(), start + absl::Seconds(59));
+    screen.Update(TwoRunning(), start + absl::Seconds(61));
+    screen.End();
+  }
   std::rewind(file);
   std::string text(4096, '\0');
   text.resize(std::fread(text.data(), 1, text.size(), file));

@@ -164,7 +164,8 @@ TEST(ProgressTest, WritesALineNowAndThenWhereThereIsNoTerminal) {
   TempDir folder;
   std::FILE* file = std::fopen((folder / "out").c_str(), "w");
   {
-    ProgressLine line(file, absl::Seconds(10));
+    Output out(fileno(file));
+    ProgressLine line(&out, absl::Seconds(10));
     const absl::Time start = absl::FromUnixSeconds(1000);
     for (int second = 0; second <= 20; ++second) line.Update({}, start + absl::Seconds(second));
     line.Say("a word");

@@ -64,6 +64,18 @@ TEST_F(RunPlanTest, NamesTheFolderAfterTheRun) {
                                             absl::FormatTime("%Y%m%d-%H%M%S", kNow, absl::LocalTimeZone())));
 }
 
+// As two launches in one second do.
+TEST_F(RunPlanTest, GivesTwoRunsOfOneNameFoldersOfTheirOwn) {
+  std::filesystem::current_path(folder_.path());
+  LaunchOptions options = Options();
+  options.run_dir.clear();
+  const auto first = PrepareRun(options, kNow), second = PrepareRun(options, kNow),
+             third = PrepareRun(options, kNow);
+  ASSERT_TRUE(first.ok() && second.ok() && third.ok()) << second.status();
+  EXPECT_EQ(second->folder.root, first->folder.root + "-2");
+  EXPECT_EQ(third->folder.root, first->folder.root + "-3");
+}
+
 TEST_F(RunPlanTest, RefusesAFolderThatExistsWithoutResume) {
   ASSERT_TRUE(PrepareRun(Options(), kNow).ok());
   const auto again = PrepareRun(Options(), kNow);
@@ -105,6 +117,8 @@ TEST_F(RunPlanTest, ResumesUnderAnotherLearningRate) {
                          true),
                  kNow);
   ASSERT_TRUE(plan.ok()) << plan.status();
+  EXPECT_EQ(LoadConfig(plan->claim->config_path())->algorithm().learning_rate(), 1e-4);
+  ASSERT_TRUE(plan->claim->Begin().ok());
   EXPECT_EQ(LoadConfig(plan->folder.config())->algorithm().learning_rate(), 1e-4);
 }
 
@@ -112,14 +126,16 @@ TEST_F(RunPlanTest, RefusesToResumeAnotherRunAndNamesTheFields) {
   ASSERT_TRUE(PrepareRun(Options(), kNow).ok());
   MakeStore();
   const std::string before = *ReadFile(RunFolder{run_}.config());
-  const auto plan = PrepareRun(Options({"replay.capacity=6000", "network.hidden_sizes=[64, 64]",
-                                        "algorithm.dbr.epsilon=0.1", "seed=5"},
-                                       true),
-                               kNow);
+  const auto plan =
+      PrepareRun(Options({"replay.capacity=6000", "replay.byte_budget=100000000",
+                          "network.hidden_sizes=[64, 64]", "algorithm.dbr.epsilon=0.1", "seed=5"},
+                         true),
+                 kNow);
   EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_THAT(std::string(plan.status().message()),
-              AllOf(HasSubstr("replay.capacity: 5000 -> 6000"), HasSubstr("hidden_sizes"),
-                    HasSubstr("epsilon"), Not(HasSubstr("seed"))));
+  EXPECT_THAT(
+      std::string(plan.status().message()),
+      AllOf(HasSubstr("replay.capacity: 5000 -> 6000"), HasSubstr("replay.byte_budget: 0 -> 100000000"),
+            HasSubstr("hidden_sizes"), HasSubstr("epsilon"), Not(HasSubstr("seed"))));
   EXPECT_EQ(*ReadFile(RunFolder{run_}.config()), before);
 }
 
@@ -130,7 +146,7 @@ TEST_F(RunPlanTest, ResumesARunThatNeverBeganAsANewOne) {
   ASSERT_TRUE(plan.ok()) << plan.status();
   EXPECT_FALSE(plan->resume);
   EXPECT_EQ(LoadConfig(plan->folder.config())->replay().capacity(), 6000);
-  plan->lock.reset();
+  plan->claim.reset();
   MakeStore();
   plan = PrepareRun(Options({"replay.capacity=6000"}, true), kNow);
   ASSERT_TRUE(plan.ok()) << plan.status();
