@@ -14,18 +14,24 @@
 namespace dbr {
 namespace {
 
-sigset_t ShutdownSignals() {
-  sigset_t set;
-  sigemptyset(&set);
-  sigaddset(&set, SIGINT);
-  sigaddset(&set, SIGTERM);
-  return set;
+bool IsIgnored(int signal_number) {
+  struct sigaction action {};
+  return sigaction(signal_number, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
 }
 
 }  // namespace
 
+sigset_t StopSignals(bool hangup) {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGTERM);
+  if (!IsIgnored(SIGINT)) sigaddset(&set, SIGINT);
+  if (hangup && !IsIgnored(SIGHUP)) sigaddset(&set, SIGHUP);
+  return set;
+}
+
 void BlockShutdownSignals() {
-  const sigset_t set = ShutdownSignals();
+  const sigset_t set = StopSignals();
   DBR_CHECK(pthread_sigmask(SIG_BLOCK, &set, nullptr) == 0);
   signal(SIGPIPE, SIG_IGN);
 }
@@ -40,7 +46,7 @@ std::thread ThreadWithoutSignals(std::function<void()> run) {
 }
 
 ShutdownWatcher::ShutdownWatcher(std::function<void()> on_signal) {
-  const sigset_t set = ShutdownSignals();
+  const sigset_t set = StopSignals();
   signal_fd_ = signalfd(-1, &set, SFD_CLOEXEC);
   stop_fd_ = eventfd(0, EFD_CLOEXEC);
   DBR_CHECK(signal_fd_ >= 0 && stop_fd_ >= 0);

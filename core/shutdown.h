@@ -1,12 +1,19 @@
 // A clean end on SIGINT and SIGTERM.
 #pragma once
 
+#include <signal.h>
+
 #include <functional>
 #include <thread>
 
 namespace dbr {
 
-// Blocks SIGINT and SIGTERM in the calling thread and in all threads it starts later, and ignores SIGPIPE. It
+// The signals that ask this process to stop: SIGTERM; SIGINT, unless it was told to ignore that, as a shell
+// tells the commands that it starts in the background; and with `hangup` SIGHUP, unless it was told to ignore
+// that, as nohup does.
+sigset_t StopSignals(bool hangup = false);
+
+// Blocks the StopSignals() in the calling thread and in all threads it starts later, and ignores SIGPIPE. It
 // is the first line of every main: a gRPC thread that existed before would take the signal and nothing would
 // drain.
 void BlockShutdownSignals();
@@ -15,7 +22,7 @@ void BlockShutdownSignals();
 // that will only block or wait for them later.
 std::thread ThreadWithoutSignals(std::function<void()> run);
 
-// Runs `on_signal` in a thread of its own at each SIGINT or SIGTERM, until destroyed; the destructor joins
+// Runs `on_signal` in a thread of its own at each of the StopSignals(), until destroyed; the destructor joins
 // the thread. Requires that BlockShutdownSignals() was called before any thread was started.
 class ShutdownWatcher {
  public:

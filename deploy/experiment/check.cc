@@ -144,14 +144,19 @@ std::string WrongOffline(const Config& config) {
                       config.learner().max_updates(), " and ", config.learner().offline_updates());
 }
 
+// False also where that cannot be found out.
+bool Exists(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored);
+}
+
 // What makes the file of a task's seed buffer.
 std::string RecordCommand(const Task& task, const std::string& path) {
   if (task.record_command().empty()) return "; the grid has no record_command for it";
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  return absl::StrCat(
-      "; make it with:\n    ",
-      std::filesystem::exists(folder) ? "" : absl::StrCat("mkdir -p ", folder.string(), " && "),
-      absl::StripAsciiWhitespace(task.record_command()), " --out ", path);
+  return absl::StrCat("; make it with:\n    ",
+                      Exists(folder) ? "" : absl::StrCat("mkdir -p ", folder.string(), " && "),
+                      absl::StripAsciiWhitespace(task.record_command()), " --out ", path);
 }
 
 const Task& TaskOf(const Experiment& experiment, const Cell& cell) {
@@ -230,7 +235,7 @@ void FindCellErrors(const Experiment& experiment, const std::vector<Cell>& cells
   std::set<std::string> missing;
   for (const Cell& cell : cells) {
     const std::string& path = cell.config.replay().seed_buffer().path();
-    if (path.empty() || std::filesystem::exists(path)) continue;
+    if (path.empty() || Exists(path)) continue;
     if (ReadStanding(cell).state != CellState::kNew || !missing.insert(path).second) continue;
     errors->push_back(absl::StrCat("task '", cell.task, "': expected its seed buffer, found no file '", path,
                                    "'", RecordCommand(TaskOf(experiment, cell), path)));

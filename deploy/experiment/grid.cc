@@ -110,8 +110,11 @@ Config MergedConfig(const Experiment& experiment, const Task& task, const Conten
     config.mutable_algorithm()->mutable_dbr();
   if (!config.replay().seed_buffer().path().empty()) {
     const std::filesystem::path path = std::filesystem::path(data) / config.replay().seed_buffer().path();
+    // In a working folder that has gone the path stays as it is, and is not found when it is looked for.
+    std::error_code gone;
+    const std::filesystem::path absolute = std::filesystem::absolute(path, gone);
     config.mutable_replay()->mutable_seed_buffer()->set_path(
-        std::filesystem::absolute(path).lexically_normal().string());
+        (gone ? path : absolute).lexically_normal().string());
   }
   return config;
 }

@@ -177,10 +177,12 @@ absl::StatusOr<std::unique_ptr<FolderClaim>> FolderClaim::NewOfName(const std::s
 
 absl::StatusOr<std::unique_ptr<FolderClaim>> FolderClaim::OfRun(const std::string& root) {
   ASSIGN_OR_RETURN(std::unique_ptr<FolderClaim> claim, Take(root));
-  if (claim->is_new() && HasResults({root})) {
+  std::error_code error;
+  if (!fs::exists(claim->folder().replay_store(), error) && (!claim->is_new() || HasResults({root}))) {
     return absl::FailedPreconditionError(absl::StrCat(
-        "--resume: '", root, "' holds the results of a run, and no replay store and no checkpoint ",
-        "to go on from: they were removed. Start a new run in another --run-dir."));
+        "--resume: '", root, "' has lost its replay.store (dbr experiment removes it where a cell is done, ",
+        "unless --keep-stores is given). Its policy can still be evaluated: dbr evaluate --policy ", root,
+        "\nFor more training start a new run in another --run-dir."));
   }
   RETURN_IF_ERROR(MakeFolders({root}));
   return claim;
@@ -207,6 +209,12 @@ absl::Status FolderClaim::Begin() {
   if (config_path_ == folder_.config()) return absl::OkStatus();
   // The other file stays until the launch ends, for processes that are started again read it.
   return WriteFileAtomically(folder_.config(), config_text_);
+}
+
+bool FolderClaim::IsStillThere() const {
+  struct stat claimed, there;
+  return fstat(lock_, &claimed) == 0 && stat(LockPath(folder_).c_str(), &there) == 0 &&
+         claimed.st_ino == there.st_ino && claimed.st_dev == there.st_dev;
 }
 
 void FolderClaim::Withdraw() {

@@ -35,7 +35,7 @@ class FolderClaim {
   static absl::StatusOr<std::unique_ptr<FolderClaim>> NewOfName(const std::string& root);
 
   // Claims the folder of a run to go on with it, or to begin it where nothing has begun yet.
-  // FailedPrecondition where another launch uses it, or the run has results but neither store nor checkpoint.
+  // FailedPrecondition where another launch uses it, or the run has lost its replay store.
   static absl::StatusOr<std::unique_ptr<FolderClaim>> OfRun(const std::string& root);
 
   ~FolderClaim();
@@ -55,6 +55,9 @@ class FolderClaim {
   // results of the launch before are removed.
   absl::Status Begin();
   bool has_begun() const { return begun_; }
+
+  // Whether the folder is still where it was claimed: it may be moved or removed meanwhile.
+  bool IsStillThere() const;
 
   // The launch gives up, and its processes have ended. Where a new run has not begun, what they have put into
   // the folder is removed, but for logs and the config: the same command may start it again.

@@ -101,20 +101,34 @@ absl::StatusOr<int> Launch::Run() {
   if (status.ok()) status = Train();
   line_.End();
   if (status.ok()) Say("stopping, and saving everything");
-  const bool saved = StopAll(/*ask=*/status.ok());
-  if (!status.ok()) {
-    watch_.Fail(status);
-    log_->error("{}", summary().failure);
-    SaveSummary();
-    return status;
-  }
-  SaveSummary();
+  const Stopped stopped = StopAll(/*ask=*/status.ok());
+  if (status.ok()) return Conclude(stopped);
+  watch_.Fail(status);
+  log_->error("{}", summary().failure);
+  SaveSummary().IgnoreError();  // the failure is told
+  return status;
+}
+
+absl::StatusOr<int> Launch::Conclude(const Stopped& stopped) {
+  const std::string& log = plan_.folder.log("launch");
   Say(absl::StrCat(
       "training ended (", Reason(summary()), "): ", WithCommas(summary().games), " ", presentation().episodes,
       ", ", WithCommas(summary().transitions), " transitions, ", WithCommas(summary().updates),
       " updates in ", Clock(absl::Seconds(summary().training_s)),
-      saved ? "; all is saved" : absl::StrCat("; NOT all could be saved, see ", plan_.folder.log("launch"))));
-  bool interrupted = summary().ended == RunEnding::kInterrupted;
+      stopped.services_saved ? "; all is saved" : absl::StrCat("; NOT all could be saved, see ", log)));
+  if (stopped.services_saved && !stopped.actors_ended)
+    Say(absl::StrCat("an actor or the evaluator did not end by itself, see ", log));
+  bool interrupted = stopped.by_signal;
+  if (!stopped.services_saved && !interrupted) {
+    // A table of the policy that was saved before would not be this run's.
+    const absl::Status lost = absl::AbortedError(absl::StrCat(
+        "not all could be saved when the run ended. Go on from its last checkpoint with: dbr launch ",
+        "--resume --run-dir ", plan_.folder.root));
+    watch_.Fail(lost);
+    RETURN_IF_ERROR(SaveSummary());
+    return lost;
+  }
+  RETURN_IF_ERROR(SaveSummary());
   if (!interrupted) RETURN_IF_ERROR(FinalEvaluation(&interrupted));
   if (interrupted) {
     Say(absl::StrCat("no final table; it comes with: dbr evaluate --policy ", plan_.folder.root,
@@ -130,7 +144,7 @@ absl::StatusOr<int> Launch::GiveUp(const absl::Status& why) {
   plan_.claim->Withdraw();
   if (!plan_.resume) {
     why.ok() ? watch_.Interrupt() : watch_.Fail(why);
-    SaveSummary();
+    SaveSummary().IgnoreError();  // there is nothing in it to be lost
   }
   if (!why.ok()) {
     log_->error("{}", std::string(why.message()));
@@ -149,6 +163,10 @@ void Launch::Announce() {
   Say(absl::StrCat("run folder: ", plan_.folder.root));
   const std::string& seed_buffer = summary().seed_buffer.path;
   if (!seed_buffer.empty()) Say(absl::StrCat("seed buffer: ", seed_buffer));
+  std::error_code unreadable;
+  if (plan_.resume && std::filesystem::is_empty(plan_.folder.checkpoints(), unreadable))
+    Say(absl::StrCat("no checkpoint in ", plan_.folder.checkpoints(),
+                     ": the learner starts from nothing, with the ", "transitions that are there"));
 }
 
 absl::Status Launch::StartAll() {
@@ -218,6 +236,7 @@ absl::Status Launch::Train() {
     const RunSample sample = monitor_->Latest();
     RETURN_IF_ERROR(sample.refusal);
     Observe(sample, now);
+    RETURN_IF_ERROR(SaveIfDue(now));
     if (summary().ended != RunEnding::kRunning) return absl::OkStatus();
     if (!acting_ && watch_.limits().OfflinePhaseIsOver(sample)) {
       Say(absl::StrCat("offline phase over after ", WithCommas(summary().updates), " updates: starting ",
@@ -240,25 +259,37 @@ void Launch::Observe(const RunSample& sample, absl::Time now) {
                   .offline_updates = acting_ ? 0 : summary().offline_updates},
                  now);
   }
-  if (!watch_.IsDueToBeSaved(now)) return;
+}
+
+absl::Status Launch::SaveIfDue(absl::Time now) {
+  if (!watch_.IsDueToBeSaved(now)) return absl::OkStatus();
   watch_.CountWallTime(now);
-  SaveSummary();
+  if (!plan_.claim->IsStillThere()) {
+    return absl::FailedPreconditionError(absl::StrCat("run folder '", plan_.folder.root,
+                                                      "' was moved or removed while the run was at work. ",
+                                                      "Move it back and go on with --resume."));
+  }
+  if (const absl::Status saved = SaveSummary(); !saved.ok()) log_->warn("{}", std::string(saved.message()));
+  return absl::OkStatus();
 }
 
 // Actors first; then what the services count is final and, where `ask` is set, noted; then the services.
-bool Launch::StopAll(bool ask) {
-  if (supervisor_ == nullptr) return false;
-  bool clean = supervisor_->Stop(kStopActors);
+Launch::Stopped Launch::StopAll(bool ask) {
+  if (supervisor_ == nullptr) return {};
+  Stopped stopped;
+  stopped.actors_ended = supervisor_->Stop(kStopActors);
   if (ask && monitor_ != nullptr) watch_.Count(monitor_->Ask(kLastAnswerWithin));
   monitor_.reset();
-  clean = supervisor_->Stop() && clean;
+  stopped.services_saved = supervisor_->Stop();
+  stopped.by_signal = supervisor_->stop_signals() > 0;
   supervisor_.reset();
   watch_.CountWallTime(MonotonicNow());
-  return clean;
+  return stopped;
 }
 
 absl::Status Launch::FinalEvaluation(bool* interrupted) {
-  if (!std::filesystem::exists(plan_.folder.latest_policy())) {
+  std::error_code unreadable;
+  if (!std::filesystem::exists(plan_.folder.latest_policy(), unreadable)) {
     Say("no final table: the learner had no policy to save yet");
     return absl::OkStatus();
   }
@@ -280,7 +311,7 @@ absl::Status Launch::FinalEvaluation(bool* interrupted) {
   if (*interrupted) return absl::OkStatus();
   RETURN_IF_ERROR(results.status());
   watch_.SetFinalResults(*std::move(results));
-  SaveSummary();
+  RETURN_IF_ERROR(SaveSummary());
   std::string table = ResultTable(summary().final_results);
   if (const std::string returns = ReturnsTable(summary()); !returns.empty())
     absl::StrAppend(&table, "\n", returns);
@@ -293,9 +324,8 @@ void Launch::Say(const std::string& text) {
   log_->info("{}", text);
 }
 
-void Launch::SaveSummary() {
-  const absl::Status written = WriteSummary(summary(), plan_.folder);
-  if (!written.ok()) log_->warn("{}", std::string(written.message()));
+absl::Status Launch::SaveSummary() {
+  return WriteSummary(summary(), plan_.folder);
 }
 
 }  // namespace dbr

@@ -50,11 +50,23 @@ class Launch {
   // Blocks until a limit or a stop signal.
   absl::Status Train();
   void Observe(const RunSample& sample, absl::Time now);
-  // True where every process ended by itself and without an error. `ask`: for what the services count last.
-  bool StopAll(bool ask);
+  // Writes the summary now and then. FailedPrecondition where the run folder has gone; other errors are
+  // logged.
+  absl::Status SaveIfDue(absl::Time now);
+
+  struct Stopped {
+    bool actors_ended = false;    // each by itself and without an error
+    bool services_saved = false;  // the same of learner and replay: their state is on disk
+    bool by_signal = false;       // a stop signal came, before or meanwhile
+  };
+  // `ask`: for what the services count last.
+  Stopped StopAll(bool ask);
+  // Tells and notes how the run ended, and evaluates the last policy. Returns what Run does.
+  absl::StatusOr<int> Conclude(const Stopped& stopped);
   absl::Status FinalEvaluation(bool* interrupted);
   void Say(const std::string& text);
-  void SaveSummary();
+  // Errors are those of the file.
+  absl::Status SaveSummary();
 
   const RunPlan plan_;
   const std::string programs_;

@@ -9,8 +9,10 @@
 #include "absl/strings/str_cat.h"
 #include "actor/evaluator.h"
 #include "actor/exploration.h"
+#include "core/file_io.h"
 #include "core/status_macros.h"
 #include "deploy/launch/same_run.h"
+#include "deploy/launch/summary_reader.h"
 #include "envs/env.h"
 #include "envs/registry/registry.h"
 #include "learner/algorithm.h"
@@ -64,7 +66,10 @@ absl::StatusOr<Config> LoadForLaunch(const LaunchOptions& options) {
   if (!options.seed_buffer.empty()) seed_buffer->set_path(options.seed_buffer);
   if (!options.seed_layout.empty()) seed_buffer->set_layout(options.seed_layout);
   if (options.skip_bad_rows) seed_buffer->set_skip_bad_rows(true);
-  seed_buffer->set_path(std::filesystem::absolute(seed_buffer->path()).lexically_normal().string());
+  std::error_code error;
+  const std::filesystem::path path = std::filesystem::absolute(seed_buffer->path(), error);
+  if (error) return ErrnoStatus(error.value(), "cannot find the working folder for", seed_buffer->path());
+  seed_buffer->set_path(path.lexically_normal().string());
   return config;
 }
 
@@ -116,6 +121,11 @@ absl::Status CheckRunFolder(const RunFolder& folder) {
 
 absl::Status CheckResumable(const RunFolder& folder, const Config& config) {
   ASSIGN_OR_RETURN(const Config before, LoadConfig(folder.config()));
+  if (const absl::Status read = LoadSummary(folder).status(); !read.ok() && !absl::IsNotFound(read)) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "--resume: ", read.message(), ". Restore the file, or remove it: the run then counts its ",
+        "seconds, restarts and evaluations from nothing."));
+  }
   const absl::Status same = CheckSameRun(before, config);
   if (same.ok()) return same;
   return absl::InvalidArgumentError(
@@ -156,6 +166,11 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
   const LearnerConfig& learner = plan.config.learner();
   RETURN_IF_ERROR(CheckAddress(replay.address(), "replay.address"));
   RETURN_IF_ERROR(CheckAddress(learner.address(), "learner.address"));
+  if (!replay.address().empty() && replay.address() == learner.address()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("replay.address and learner.address: expected two addresses, found '", replay.address(),
+                     "' for both"));
+  }
   if (!options.resume || !HasBegun({options.run_dir}))
     RETURN_IF_ERROR(CheckSeedBuffer(plan.config, plan.env));
   ASSIGN_OR_RETURN(plan.claim, Claim(options, plan.config, now));

@@ -14,6 +14,7 @@ namespace {
 Config Identity(const Config& config) {
   const Config whole = WithDefaults(config);
   Config identity;
+  identity.set_seed(whole.seed());
   *identity.mutable_env() = whole.env();
   *identity.mutable_network() = whole.network();
   *identity.mutable_algorithm() = whole.algorithm();

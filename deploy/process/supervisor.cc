@@ -17,6 +17,7 @@
 #include "absl/strings/str_join.h"
 #include "core/file_io.h"
 #include "core/monotonic_clock.h"
+#include "core/shutdown.h"
 #include "core/status_macros.h"
 #include "deploy/process/child_process.h"
 #include "deploy/process/log_tail.h"
@@ -25,10 +26,17 @@ namespace dbr {
 namespace {
 
 sigset_t WatchedSignals() {
-  sigset_t set;
-  sigemptyset(&set);
-  for (const int signal_number : {SIGCHLD, SIGINT, SIGTERM, SIGHUP}) sigaddset(&set, signal_number);
+  sigset_t set = StopSignals(/*hangup=*/true);
+  sigaddset(&set, SIGCHLD);
   return set;
+}
+
+// Whether a child has ended, and how.
+bool HasEnded(pid_t pid, int* wait_status) {
+  const pid_t ended = waitpid(pid, wait_status, WNOHANG);
+  if (ended >= 0) return ended == pid;
+  *wait_status = SIGKILL;  // somebody else has taken the status; that it failed is the safe reading
+  return errno == ECHILD;
 }
 
 }  // namespace
@@ -43,6 +51,8 @@ struct Supervisor::Child {
 };
 
 absl::StatusOr<std::unique_ptr<Supervisor>> Supervisor::Create(SupervisorOptions options) {
+  // A parent may have told us to ignore it, and then the kernel would take the children's statuses.
+  signal(SIGCHLD, SIG_DFL);
   const sigset_t signals = WatchedSignals();
   if (pthread_sigmask(SIG_BLOCK, &signals, nullptr) != 0) return absl::InternalError("cannot block signals");
   ASSIGN_OR_RETURN(std::unique_ptr<Guard> guard, Guard::Start(options.orphan_grace));
@@ -92,9 +102,10 @@ absl::Status Supervisor::Spawn(Child* child, bool again) {
 }
 
 // Returns the text that follows the message of a child's end.
-std::string Supervisor::LastWords(const Child& child) {
-  const std::string lines = LogTail(child.spec.log, child.log_start);
-  return lines.empty() ? ", saying nothing" : absl::StrCat(", its last lines:\n", lines);
+std::string Supervisor::LastWords(const Child& child, int lines) {
+  const std::string tail = LogTail(child.spec.log, child.log_start, lines);
+  if (tail.empty()) return ", saying nothing";
+  return absl::StrCat(lines == 1 ? ", its last line:\n" : ", its last lines:\n", tail);
 }
 
 absl::Status Supervisor::Wait(absl::Time deadline) {
@@ -127,7 +138,7 @@ void Supervisor::Poll(absl::Time deadline) {
 absl::Status Supervisor::ReapAll() {
   for (const auto& child : children_) {
     int status = 0;
-    if (child->pid == 0 || waitpid(child->pid, &status, WNOHANG) != child->pid) continue;
+    if (child->pid == 0 || !HasEnded(child->pid, &status)) continue;
     if (child->spec.once) {
       NoteEnd(child.get(), status);
     } else {
@@ -183,7 +194,8 @@ absl::Status Supervisor::OnDeath(Child* child, int wait_status) {
   child->restarts.push_back(now);
   options_.on_event(
       absl::StrCat(death, ": starting it again (", child->restarts.size(), " of at most ",
-                   options_.max_restarts, " within ", absl::FormatDuration(options_.restart_window), ")"),
+                   options_.max_restarts, " within ", absl::FormatDuration(options_.restart_window), ")",
+                   LastWords(*child, /*lines=*/1)),
       /*notable=*/true);
   return absl::OkStatus();
 }
@@ -239,10 +251,14 @@ bool Supervisor::StopRank(int rank) {
     deadline = std::max(deadline, MonotonicNow() + child->spec.stop_grace);
   }
   const int signals_before = stop_signals_;
-  bool killed = false;
+  bool killed = false, told = false;
   while (ReapStopped(rank, &clean)) {
     Poll(deadline);
-    const bool interrupted = stop_signals_ != signals_before;
+    // The first signal of all asks for what is being done already.
+    const bool interrupted = stop_signals_ != signals_before && stop_signals_ > 1;
+    if (stop_signals_ == 1 && signals_before == 0 && !std::exchange(told, true))
+      options_.on_event("stopping and saving already; another signal kills what has not ended",
+                        /*notable=*/true);
     if (killed || (!interrupted && MonotonicNow() < deadline)) continue;
     if (!ReapStopped(rank, &clean)) break;
     KillRank(rank, interrupted);
@@ -258,7 +274,7 @@ bool Supervisor::ReapStopped(int rank, bool* clean) {
   for (const auto& child : children_) {
     if (child->spec.stop_rank != rank || child->pid == 0) continue;
     int status = 0;
-    if (waitpid(child->pid, &status, WNOHANG) != child->pid) {
+    if (!HasEnded(child->pid, &status)) {
       running = true;
       continue;
     }

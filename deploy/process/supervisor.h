@@ -52,8 +52,8 @@ struct SupervisorOptions {
 
 // Owns its children. All calls except Wake must come from one thread: the one that creates it. That thread
 // must live as long as the process, because the kernel ends children with the thread that started them.
-// Create it before the process starts other threads: it blocks SIGCHLD, SIGINT, SIGTERM and SIGHUP, and
-// receives them from then on.
+// Create it before the process starts other threads: it blocks SIGCHLD and the StopSignals() with SIGHUP
+// (core/shutdown.h), and receives them from then on.
 class Supervisor {
  public:
   // Returns Internal where the signals cannot be blocked, and the errors of Guard::Start and of making file
@@ -84,14 +84,14 @@ class Supervisor {
   // Ends the current Wait, or the next one. Thread-safe.
   void Wake();
 
-  // The number of SIGINT, SIGTERM and SIGHUP so far. A SIGHUP after another signal does not count.
+  // The number of stop signals (core/shutdown.h) so far. A SIGHUP after another signal does not count.
   int stop_signals() const { return stop_signals_; }
   std::uint64_t restarts() const { return restarts_; }
   // Returns 0 where there is no child of that name or it does not run now.
   pid_t pid(const std::string& name) const;
 
   // Stops the children of each rank up to `last_rank` in turn: sends SIGTERM, and SIGKILL to those that still
-  // run after their grace or at the next stop signal. Blocks until all of them have ended. Returns whether
+  // run after their grace or at the next stop signal; where there was none before, at the second. Blocks until all of them have ended. Returns whether
   // every one ended by itself with status 0. Processes with `once` do not count.
   bool Stop(int last_rank = std::numeric_limits<int>::max());
 
@@ -101,7 +101,7 @@ class Supervisor {
   Supervisor(SupervisorOptions options, std::unique_ptr<Guard> guard, int signal_fd, int wake_fd);
   absl::Status Spawn(Child* child, bool again);
   absl::Status RestartDue();
-  static std::string LastWords(const Child& child);
+  static std::string LastWords(const Child& child, int lines = 5);
   absl::Status OnDeath(Child* child, int wait_status);
   void NoteEnd(Child* child, int wait_status);
   absl::Status ReapAll();

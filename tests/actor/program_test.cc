@@ -45,6 +45,7 @@ class Program {
       if (!absl::StartsWith(*entry, "OPENBLAS_NUM_THREADS=")) envp.push_back(*entry);
     }
     envp.push_back(nullptr);
+    signal(SIGINT, SIG_DFL);  // whoever runs the tests may have told them to ignore it
     DBR_CHECK(posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), envp.data()) == 0);
     posix_spawn_file_actions_destroy(&actions);
     close(ends[1]);

@@ -16,6 +16,7 @@ namespace {
 class ShutdownTest : public testing::Test {
  protected:
   ShutdownTest() {
+    signal(SIGINT, SIG_DFL);  // whoever runs the tests may have told them to ignore it
     pthread_sigmask(SIG_SETMASK, nullptr, &old_mask_);
     BlockShutdownSignals();
   }
@@ -47,6 +48,19 @@ TEST_F(ShutdownTest, EachSignalCallsBack) {
   EXPECT_TRUE(WaitForCount(2));
   kill(getpid(), SIGTERM);
   EXPECT_TRUE(WaitForCount(3));
+}
+
+TEST(StopSignalsTest, LeaveOutWhatTheProcessWasToldToIgnore) {
+  for (const int number : {SIGINT, SIGHUP}) {
+    signal(number, SIG_DFL);
+    const sigset_t heard = StopSignals(/*hangup=*/true);
+    EXPECT_EQ(sigismember(&heard, number), 1);
+    signal(number, SIG_IGN);
+    const sigset_t ignored = StopSignals(/*hangup=*/true);
+    EXPECT_EQ(sigismember(&ignored, number), 0);
+    EXPECT_EQ(sigismember(&ignored, SIGTERM), 1);
+    signal(number, SIG_DFL);
+  }
 }
 
 TEST_F(ShutdownTest, EndsWithoutASignal) {

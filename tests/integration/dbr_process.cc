@@ -46,7 +46,16 @@ DbrProcess::DbrProcess(const std::string& program, std::vector<std::string> argu
     if (!absl::StartsWith(*entry, "OPENBLAS_NUM_THREADS=")) entries.push_back(*entry);
   }
   entries.push_back(nullptr);
-  DBR_CHECK(posix_spawn(&pid_, argv[0], &actions, nullptr, argv.data(), entries.data()) == 0);
+  // As in a terminal: whoever runs the tests may have told them to ignore these.
+  sigset_t heard;
+  sigemptyset(&heard);
+  for (const int number : {SIGINT, SIGHUP, SIGCHLD}) sigaddset(&heard, number);
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setsigdefault(&attributes, &heard);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
+  DBR_CHECK(posix_spawn(&pid_, argv[0], &actions, &attributes, argv.data(), entries.data()) == 0);
+  posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&actions);
   close(ends[1]);
   output_fd_ = ends[0];

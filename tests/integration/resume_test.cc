@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <filesystem>
 #include <map>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::Not;
 
 class ResumeTest : public testing::Test {
@@ -72,6 +74,15 @@ TEST_F(ResumeTest, AStartThatFailedDoesNotStandInTheWayOfTheNext) {
   const auto [again, exists] = Launch({SmallConfig(), "--set", "learner.max_updates=20"});
   EXPECT_EQ(again, 1);
   EXPECT_THAT(exists, HasSubstr("exists already"));
+}
+
+TEST_F(ResumeTest, ARunWhoseFolderIsMovedEndsAndSaysSo) {
+  DbrProcess launch("dbr", {"launch", SmallConfig(), "--run-dir", run_.root});
+  ASSERT_TRUE(launch.Await([&] { return Counter(run_, "relabelled") > 0; })) << launch.output();
+  std::filesystem::rename(run_.root, folder_ / "moved");
+  EXPECT_EQ(launch.Wait(), 1);
+  EXPECT_THAT(launch.output(), HasSubstr("was moved or removed while the run was at work"));
+  EXPECT_THAT(ProcessesOf("dbr", run_.root), IsEmpty());
 }
 
 // A named pipe that is full, and that nobody reads.

@@ -112,7 +112,7 @@ TEST_F(FolderClaimTest, RefusesToGoOnWhereTheStoreWasRemoved) {
   MakeFinishedRun();
   fs::remove(run_.replay_store());
   EXPECT_THAT(std::string(FolderClaim::OfRun(run_.root).status().message()),
-              AllOf(HasSubstr("no replay store"), HasSubstr("Start a new run")));
+              AllOf(HasSubstr("has lost its replay.store"), HasSubstr("dbr evaluate --policy")));
 }
 
 // The same command works again, once what was in its way has gone.

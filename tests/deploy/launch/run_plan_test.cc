@@ -135,8 +135,22 @@ TEST_F(RunPlanTest, RefusesToResumeAnotherRunAndNamesTheFields) {
   EXPECT_THAT(
       std::string(plan.status().message()),
       AllOf(HasSubstr("replay.capacity: 5000 -> 6000"), HasSubstr("replay.byte_budget: 0 -> 100000000"),
-            HasSubstr("hidden_sizes"), HasSubstr("epsilon"), Not(HasSubstr("seed"))));
+            HasSubstr("hidden_sizes"), HasSubstr("epsilon"), HasSubstr("seed: 1 -> 5")));
   EXPECT_EQ(*ReadFile(RunFolder{run_}.config()), before);
+}
+
+// The launch would count from nothing and overwrite what can still be repaired.
+TEST_F(RunPlanTest, RefusesToResumeWhereTheSummaryIsDamaged) {
+  ASSERT_TRUE(PrepareRun(Options(), kNow).ok());
+  MakeStore();
+  const std::string summary = RunFolder{run_}.summary();
+  for (const char* damaged : {"", "{", "[]"}) {
+    ASSERT_TRUE(WriteFileAtomically(summary, damaged).ok());
+    const auto plan = PrepareRun(Options({}, true), kNow);
+    EXPECT_THAT(std::string(plan.status().message()),
+                AllOf(HasSubstr(summary), HasSubstr("Restore the file, or remove")));
+    EXPECT_EQ(*ReadFile(summary), damaged);
+  }
 }
 
 // It failed at its start, of its config perhaps.
@@ -166,6 +180,14 @@ TEST_F(RunPlanTest, RefusesAFolderInUse) {
   const auto second = PrepareRun(Options({}, true), kNow);
   EXPECT_EQ(second.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(std::string(second.status().message()), HasSubstr("in use by another launch"));
+}
+
+TEST_F(RunPlanTest, RefusesOneAddressForBothServices) {
+  const auto plan =
+      PrepareRun(Options({"replay.address='unix:/x.sock'", "learner.address='unix:/x.sock'"}), kNow);
+  EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(plan.status().message()), HasSubstr("expected two addresses"));
+  EXPECT_FALSE(std::filesystem::exists(run_));
 }
 
 TEST_F(RunPlanTest, RefusesAnAddressThatNobodyCouldBeTold) {

@@ -37,6 +37,11 @@ constexpr absl::Duration kLong = absl::Seconds(60);  // reached only where somet
 
 class SupervisorTest : public testing::Test {
  protected:
+  // As in a terminal: whoever runs the tests may have told them to ignore some of these.
+  SupervisorTest() {
+    for (const int number : {SIGHUP, SIGINT, SIGCHLD}) signal(number, SIG_DFL);
+  }
+
   std::unique_ptr<Supervisor> Make(SupervisorOptions options = {}) {
     if (options.first_restart_delay == SupervisorOptions().first_restart_delay)
       options.first_restart_delay = absl::Milliseconds(1);
@@ -242,9 +247,40 @@ TEST_F(SupervisorTest, AnotherSignalKillsTheChildThatIsWaitedFor) {
   ProcessSpec spec = Child("learner", {"wait-and-interrupt-parent"});
   spec.stop_grace = absl::Hours(1);
   ASSERT_TRUE(supervisor->Start(spec).ok());
+  kill(getpid(), SIGINT);
+  EXPECT_TRUE(supervisor->Wait(absl::InfiniteFuture()).ok());
+  EXPECT_FALSE(supervisor->Stop());
+  EXPECT_EQ(supervisor->stop_signals(), 2);
+  EXPECT_THAT(events_, ElementsAre(HasSubstr("a second signal came"), HasSubstr("signal 9")));
+}
+
+// A run that comes to its limit stops without a signal: the first Ctrl-C asks for what is being done.
+TEST_F(SupervisorTest, TheFirstSignalKillsNobodyWhereAllIsBeingStoppedAlready) {
+  const auto supervisor = Make();
+  ProcessSpec spec = Child("learner", {"wait-and-interrupt-parent"});
+  spec.stop_grace = absl::Milliseconds(300);
+  ASSERT_TRUE(supervisor->Start(spec).ok());
   EXPECT_FALSE(supervisor->Stop());
   EXPECT_EQ(supervisor->stop_signals(), 1);
-  EXPECT_THAT(events_, ElementsAre(HasSubstr("a second signal came"), HasSubstr("signal 9")));
+  EXPECT_THAT(events_, ElementsAre(HasSubstr("another signal kills"),
+                                   HasSubstr("still there 300ms after SIGTERM"), HasSubstr("signal 9")));
+}
+
+// As under nohup, and in the background of a script.
+TEST_F(SupervisorTest, IgnoresTheSignalsThatItWasToldToIgnore) {
+  for (const int number : {SIGHUP, SIGINT}) signal(number, SIG_IGN);
+  const auto supervisor = Make();
+  for (const int number : {SIGHUP, SIGINT, SIGTERM}) kill(getpid(), number);
+  EXPECT_TRUE(supervisor->Wait(absl::InfiniteFuture()).ok());
+  EXPECT_EQ(supervisor->stop_signals(), 1);
+}
+
+// The kernel then takes the status of each child that ends, unless we ask for it.
+TEST_F(SupervisorTest, SeesItsChildrenEndThoughItsParentIgnoredSuchSignals) {
+  signal(SIGCHLD, SIG_IGN);
+  const auto supervisor = Make({.max_restarts = 0});
+  ASSERT_TRUE(supervisor->Start(Child("learner", {"say", "no", "exit", "3"})).ok());
+  EXPECT_THAT(std::string(Fail(supervisor.get()).message()), HasSubstr("exited with status 3"));
 }
 
 TEST_F(SupervisorTest, CountsStopSignalsAndReturnsAtOnce) {
