@@ -131,8 +131,9 @@ absl::StatusOr<int> Launch::Conclude(const Stopped& stopped) {
   RETURN_IF_ERROR(SaveSummary());
   if (!interrupted) RETURN_IF_ERROR(FinalEvaluation(&interrupted));
   if (interrupted) {
-    Say(absl::StrCat("no final table; it comes with: dbr evaluate --policy ", plan_.folder.root,
-                     "\ncontinue with: dbr launch --resume --run-dir ", plan_.folder.root));
+    if (HasPolicy())
+      Say(absl::StrCat("no final table; it comes with: dbr evaluate --policy ", plan_.folder.root));
+    Say(absl::StrCat("continue with: dbr launch --resume --run-dir ", plan_.folder.root));
   }
   Say(absl::StrCat("run folder: ", plan_.folder.root));
   return interrupted ? kInterruptedExit : 0;
@@ -163,10 +164,19 @@ void Launch::Announce() {
   Say(absl::StrCat("run folder: ", plan_.folder.root));
   const std::string& seed_buffer = summary().seed_buffer.path;
   if (!seed_buffer.empty()) Say(absl::StrCat("seed buffer: ", seed_buffer));
+  if (plan_.resume) TellWhatIsLost();
+}
+
+void Launch::TellWhatIsLost() {
   std::error_code unreadable;
-  if (plan_.resume && std::filesystem::is_empty(plan_.folder.checkpoints(), unreadable))
+  if (std::filesystem::is_empty(plan_.folder.checkpoints(), unreadable)) {
     Say(absl::StrCat("no checkpoint in ", plan_.folder.checkpoints(),
-                     ": the learner starts from nothing, with the ", "transitions that are there"));
+                     ": the learner starts from nothing, with the transitions that are there"));
+  }
+  if (!std::filesystem::exists(plan_.folder.summary(), unreadable)) {
+    Say(absl::StrCat("no ", plan_.folder.summary(),
+                     ": the run counts its seconds, restarts and evaluations from nothing"));
+  }
 }
 
 absl::Status Launch::StartAll() {
@@ -287,9 +297,13 @@ Launch::Stopped Launch::StopAll(bool ask) {
   return stopped;
 }
 
-absl::Status Launch::FinalEvaluation(bool* interrupted) {
+bool Launch::HasPolicy() const {
   std::error_code unreadable;
-  if (!std::filesystem::exists(plan_.folder.latest_policy(), unreadable)) {
+  return std::filesystem::exists(plan_.folder.latest_policy(), unreadable);
+}
+
+absl::Status Launch::FinalEvaluation(bool* interrupted) {
+  if (!HasPolicy()) {
     Say("no final table: the learner had no policy to save yet");
     return absl::OkStatus();
   }

@@ -39,6 +39,8 @@ class Launch {
   const EnvPresentation& presentation() const;
 
   void Announce();
+  // In a resume: what of the run is no longer there.
+  void TellWhatIsLost();
   // Services, and actors where there is no offline phase. Once the services serve, the run folder is this
   // launch's (FolderClaim::Begin). OK also where a stop signal came first.
   absl::Status StartAll();
@@ -63,6 +65,7 @@ class Launch {
   Stopped StopAll(bool ask);
   // Tells and notes how the run ended, and evaluates the last policy. Returns what Run does.
   absl::StatusOr<int> Conclude(const Stopped& stopped);
+  bool HasPolicy() const;
   absl::Status FinalEvaluation(bool* interrupted);
   void Say(const std::string& text);
   // Errors are those of the file.
