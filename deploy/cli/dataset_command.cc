@@ -79,15 +79,17 @@ absl::StatusOr<int> RunConvert(const ConvertFlags& flags) {
 void AddInfo(CLI::App* dataset, int* exit_code) {
   auto flags = std::make_shared<InfoFlags>();
   CLI::App* command =
-      dataset->add_subcommand("info", "Show what a file holds: rows, episodes, returns, bad values");
-  command->add_option("FILE", flags->path, "HDF5 file")->required()->type_name("FILE");
+      dataset->add_subcommand("info", "Show what a file holds: rows, episodes, returns, bad rows");
+  command->add_option("FILE", flags->path, "HDF5 file, or folder of a Minari dataset")
+      ->required()
+      ->type_name("FILE");
   command
-      ->add_option("--layout", flags->layout, "Layout of the file [as its own attribute says; never guessed]")
+      ->add_option("--layout", flags->layout, "Layout of the file [as the file itself says; never guessed]")
       ->type_name(kLayoutNames);
-  command->add_flag(
-      "--json", flags->json,
-      "Print one JSON object: {layout, rows, transitions, episodes, terminals, timeouts, non_finite, "
-      "return: {mean, std, min, max}}");
+  command->add_flag("--json", flags->json,
+                    "Print one JSON object: {layout, rows, transitions, episodes, terminals, timeouts, "
+                    "non_finite, bad_flags, "
+                    "return: {mean, std, min, max}}");
   command->footer("Example: dbr dataset info hopper_medium.hdf5 --layout d4rl_pybullet");
   command->callback([flags, exit_code] {
     const absl::StatusOr<int> result = RunInfo(*flags);
@@ -98,8 +100,10 @@ void AddInfo(CLI::App* dataset, int* exit_code) {
 void AddConvert(CLI::App* dataset, int* exit_code) {
   auto flags = std::make_shared<ConvertFlags>();
   CLI::App* command = dataset->add_subcommand("convert", "Write a file's transitions in another layout");
-  command->add_option("IN", flags->in, "HDF5 file")->required()->type_name("FILE");
-  command->add_option("--layout", flags->from, "Layout of IN [as its own attribute says; never guessed]")
+  command->add_option("IN", flags->in, "HDF5 file, or folder of a Minari dataset")
+      ->required()
+      ->type_name("FILE");
+  command->add_option("--layout", flags->from, "Layout of IN [as the file itself says; never guessed]")
       ->type_name(kLayoutNames);
   command->add_option("--to", flags->to, "Layout of the file to write")
       ->required()
@@ -110,7 +114,7 @@ void AddConvert(CLI::App* dataset, int* exit_code) {
       ->required()
       ->type_name("FILE");
   command->add_flag("--skip-bad-rows", flags->skip_bad_rows,
-                    "Leave out rows with values that are not finite");
+                    "Leave out rows with a value that is not finite, or a flag neither 0 nor 1");
   command->footer(
       "Example: dbr dataset convert published.hdf5 --layout d4rl_pybullet --to d4rl --out hopper.hdf5");
   command->callback([flags, exit_code] {

@@ -26,7 +26,7 @@ void AddDatasetRecord(CLI::App* dataset, int* exit_code);
 absl::StatusOr<std::optional<DatasetLayout>> ParseLayoutOption(const std::string& option,
                                                                const std::string& name);
 
-// Reads the whole file and reports on it; rows with values that are not finite are counted and left out.
+// Reads the whole file and reports on it; bad rows are counted and left out.
 // `layout`: none takes the file's own word. Blocks. Errors: DatasetReader::Open's and Next's, naming the
 // file; Cancelled after the user's interrupt.
 absl::StatusOr<DatasetReport> ReportDataset(const std::string& path, std::optional<DatasetLayout> layout,

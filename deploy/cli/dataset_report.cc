@@ -27,7 +27,10 @@ std::string DatasetText(const DatasetReport& report) {
                         " ended by a terminal, ", WithCommas(facts.timeouts), " by the time limit)")),
       Line("return", absl::StrCat(Fixed(facts.return_mean, 1), " ± ", Fixed(facts.return_std, 1), " (from ",
                                   Fixed(facts.return_min, 1), " to ", Fixed(facts.return_max, 1), ")")),
-      Line("not finite", absl::StrCat(WithCommas(facts.non_finite), " rows")));
+      Line("bad rows", facts.bad_rows == 0
+                           ? "0"
+                           : absl::StrCat(WithCommas(facts.bad_rows),
+                                          " (a value is not finite, or a flag neither 0 nor 1)")));
   return text;
 }
 
@@ -39,7 +42,8 @@ nlohmann::ordered_json DatasetJson(const DatasetReport& report) {
           {"episodes", facts.episodes},
           {"terminals", facts.terminals},
           {"timeouts", facts.timeouts},
-          {"non_finite", facts.non_finite},
+          {"non_finite", facts.bad_rows},
+          {"bad_flags", facts.bad_flags},
           {"return",
            {{"mean", facts.return_mean},
             {"std", facts.return_std},

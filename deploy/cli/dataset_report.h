@@ -19,8 +19,9 @@ struct DatasetReport {
 // A line for each fact.
 std::string DatasetText(const DatasetReport& report);
 
-// {layout, rows, transitions, episodes, terminals, timeouts, non_finite, return: {mean, std, min, max}}; the
-// figures of the return are null where no episode ended.
+// {layout, rows, transitions, episodes, terminals, timeouts, non_finite, bad_flags, return: {mean, std, min,
+// max}}. `non_finite` counts all bad rows, `bad_flags` those among them with a flag that is neither 0 nor 1.
+// The figures of the return are null where no episode ended.
 nlohmann::ordered_json DatasetJson(const DatasetReport& report);
 
 }  // namespace dbr

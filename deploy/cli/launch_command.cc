@@ -57,15 +57,18 @@ void AddLaunch(CLI::App* app, int* exit_code) {
       ->type_name("DIR");
   command->add_flag("--resume", flags->options.resume, "Continue the run in --run-dir");
   command
-      ->add_option("--seed-buffer", flags->options.seed_buffer,
-                   "HDF5 file of offline data that the replay server begins with: replay.seed_buffer.path")
+      ->add_option(
+          "--seed-buffer", flags->options.seed_buffer,
+          "HDF5 file of offline data, or folder of a Minari dataset, that the replay server begins with: "
+          "replay.seed_buffer.path")
       ->type_name("FILE");
   command
       ->add_option("--seed-layout", flags->options.seed_layout,
-                   "Layout of the seed buffer [as its own attribute says; never guessed]")
+                   "Layout of the seed buffer [as the file itself says; never guessed]")
       ->type_name(kLayoutNames);
-  command->add_flag("--skip-bad-rows", flags->options.skip_bad_rows,
-                    "Leave out rows of the seed buffer with values that are not finite");
+  command->add_flag(
+      "--skip-bad-rows", flags->options.skip_bad_rows,
+      "Leave out rows of the seed buffer with a value that is not finite, or a flag neither 0 nor 1");
   command->footer(
       "The run ends when it reaches launch.max_seconds, launch.max_episodes, launch.max_steps,\n"
       "launch.stop_at_return or learner.max_updates of the config, or on Ctrl-C; everything is saved first.\n"

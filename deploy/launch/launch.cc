@@ -222,7 +222,8 @@ void Launch::TellOfTheSeedBuffer() {
                    Fixed(seed_buffer.return_mean, 1), " ± ", Fixed(seed_buffer.return_std, 1),
                    "; it was loaded at ", Compact(seed_buffer.rows_per_second), " rows/s"));
   if (seed_buffer.bad_rows > 0)
-    Say(absl::StrCat(WithCommas(seed_buffer.bad_rows), " rows with values that are not finite are left out"));
+    Say(absl::StrCat(WithCommas(seed_buffer.bad_rows),
+                     " bad rows (a value is not finite, or a flag neither 0 nor 1) are left out"));
 }
 
 absl::Status Launch::WaitUntilServing(const std::string& name, const std::string& address,

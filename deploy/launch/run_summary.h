@@ -16,10 +16,11 @@ namespace dbr {
 
 // The seed buffer that the replay server holds. `rows` is 0 where there is none.
 struct SeedBufferSummary {
-  std::string path;            // as the config has it
-  std::uint64_t rows = 0;      // transitions that were loaded
-  std::uint64_t bad_rows = 0;  // rows with values that are not finite, which were left out
-  std::uint64_t episodes = 0;  // whole ones
+  std::string path;        // as the config has it
+  std::uint64_t rows = 0;  // transitions that were loaded
+  // Rows that were left out: a value is not finite, or a flag neither 0 nor 1.
+  std::uint64_t bad_rows = 0;
+  std::uint64_t episodes = 0;                                              // whole ones
   double return_mean = 0, return_std = 0, return_min = 0, return_max = 0;  // over the whole episodes
   double rows_per_second = 0;
 };

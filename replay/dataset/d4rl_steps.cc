@@ -18,7 +18,7 @@ class D4rlSteps : public StepSource {
   std::int64_t rows() const override { return window_.columns().observations.rows(); }
   int observation_size() const override { return window_.columns().observations.width(); }
   int action_width() const override { return window_.columns().actions.width(); }
-  BadRows bad_rows() const override { return window_.bad_rows(); }
+  RowFaults faults() const override { return window_.faults(); }
 
   absl::StatusOr<absl::Span<const Step>> NextSteps() override {
     steps_.clear();

@@ -11,9 +11,11 @@ struct DatasetFacts {
   std::int64_t transitions = 0;  // handed out
   // Episodes that ended: terminals + timeouts. One that the file's end cuts is not among them.
   std::int64_t episodes = 0;
-  std::int64_t terminals = 0;   // ends of the task
-  std::int64_t timeouts = 0;    // cuts at the time limit
-  std::int64_t non_finite = 0;  // rows with a NaN or an infinite value
+  std::int64_t terminals = 0;  // ends of the task
+  std::int64_t timeouts = 0;   // cuts at the time limit
+  // Rows with a NaN or an infinite value, or with a flag that is neither 0 nor 1.
+  std::int64_t bad_rows = 0;
+  std::int64_t bad_flags = 0;  // of them, those with such a flag
   // Statistics of the undiscounted returns of the episodes that ended and have no such row; NaN where there
   // are none.
   double return_mean = std::numeric_limits<double>::quiet_NaN();

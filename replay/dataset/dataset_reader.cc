@@ -92,6 +92,7 @@ struct DatasetReader::State {
     return {.max_episode_steps = options.max_episode_steps, .flags_only = flags_only};
   }
   absl::Status Refill();
+  void TakeFaults();
   absl::Status RefuseBadRows();
   absl::Status Fill(TransitionChunk* chunk);
   void Take(const Step& step, TransitionChunk* chunk);
@@ -103,8 +104,8 @@ struct DatasetReader::State {
 absl::Status DatasetReader::State::Refill() {
   ASSIGN_OR_RETURN(steps, source->NextSteps());
   next = 0;
-  facts.non_finite = source->bad_rows().count;
-  if (facts.non_finite > 0 && !options.skip_bad_rows) return RefuseBadRows();
+  TakeFaults();
+  if (facts.bad_rows > 0 && !options.skip_bad_rows) return RefuseBadRows();
   return absl::OkStatus();
 }
 
@@ -112,12 +113,22 @@ absl::Status DatasetReader::State::RefuseBadRows() {
   while (!steps.empty()) {
     ASSIGN_OR_RETURN(steps, source->NextSteps());
   }
-  const BadRows bad = source->bad_rows();
-  facts.non_finite = bad.count;
-  return absl::InvalidArgumentError(
-      absl::StrCat(file.path(), ": expected finite numbers, found NaN or infinity in ", bad.count, " of ",
-                   facts.rows, " rows, the first of them row ", bad.first,
-                   " (counted from 0); repair the file, or leave such ", "rows out with --skip-bad-rows"));
+  TakeFaults();
+  const RowFaults faults = source->faults();
+  const std::string flags = faults.bad_flags == 0 ? ""
+                                                  : absl::StrCat(" (in ", faults.bad_flags,
+                                                                 " of them a flag that is neither 0 nor 1)");
+  return absl::InvalidArgumentError(absl::StrCat(
+      file.path(), ": expected finite numbers",
+      faults.bad_flags == 0 ? ", found NaN or infinity in " : " and flags of 0 or 1, found other values in ",
+      faults.bad, " of ", facts.rows, " rows", flags, ", the first of them row ", faults.first_bad,
+      " (counted from 0); repair the file, or leave such ", "rows out with --skip-bad-rows"));
+}
+
+void DatasetReader::State::TakeFaults() {
+  const RowFaults faults = source->faults();
+  facts.bad_rows = faults.bad;
+  facts.bad_flags = faults.bad_flags;
 }
 
 absl::Status DatasetReader::State::Fill(TransitionChunk* chunk) {

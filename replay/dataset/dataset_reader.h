@@ -24,8 +24,9 @@ struct DatasetOptions {
   // d4rl_pybullet and d4rl without `timeouts`: an episode of that many steps is cut, not terminal. 0: as the
   // file's own attribute `max_episode_steps` says, else 1,000.
   int max_episode_steps = 0;
-  // Leaves out every transition that takes a value from a row with a NaN or an infinity. Without it such a
-  // file is refused as soon as one is met.
+  // Leaves out every transition that takes a value from a bad row: one with a NaN or an infinity, or with a
+  // flag that is neither 0 nor 1 (no episode ends there). Without it such a file is refused as soon as a bad
+  // row is met.
   bool skip_bad_rows = false;
 };
 
@@ -52,9 +53,9 @@ class DatasetReader {
   int max_episode_steps() const;
 
   // Refills `chunk`, made with transition_layout(), and returns chunk->size: less than its capacity only at
-  // the end of the file, and 0 from then on. Errors: InvalidArgument for a row with a value that is not
-  // finite (its number, and how many there are; options.skip_bad_rows would drop them), DataLoss where the
-  // file cannot be read. After an error the same error again. Reads from disk.
+  // the end of the file, and 0 from then on. Errors: InvalidArgument for a bad row (its
+  // number, and how many there are; options.skip_bad_rows would drop them), DataLoss where the file cannot
+  // be read. After an error the same error again. Reads from disk.
   absl::StatusOr<int> Next(TransitionChunk* chunk);
 
   // How many transitions Next will hand out where no row is bad. Reads the flags of all rows, nothing else;

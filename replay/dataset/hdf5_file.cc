@@ -75,12 +75,12 @@ absl::Status Hdf5Column::ReadFloats(std::int64_t first, int count, float* values
 absl::Status Hdf5Column::ReadFlags(std::int64_t first, int count, std::uint8_t* flags) const {
   if (byte_type_.ok()) {
     RETURN_IF_ERROR(Read(first, count, byte_type_.get(), flags));
-    for (int i = 0; i < count; ++i) flags[i] = flags[i] != 0;
+    for (int i = 0; i < count; ++i) flags[i] = std::min(flags[i], kNoFlag);
     return absl::OkStatus();
   }
-  std::vector<float> values(count);
-  RETURN_IF_ERROR(ReadFloats(first, count, values.data()));
-  for (int i = 0; i < count; ++i) flags[i] = values[i] != 0;
+  std::vector<double> values(static_cast<std::size_t>(count));  // float would round 1e-50 to 0
+  RETURN_IF_ERROR(Read(first, count, H5T_NATIVE_DOUBLE, values.data()));
+  for (int i = 0; i < count; ++i) flags[i] = values[i] == 0 ? 0 : values[i] == 1 ? 1 : kNoFlag;
   return absl::OkStatus();
 }
 

@@ -22,7 +22,8 @@ class Hdf5Column {
   // Reads rows [first, first + count) into `values` [count x width], whatever the numbers' type in the file.
   // DataLoss where the file cannot be read.
   absl::Status ReadFloats(std::int64_t first, int count, float* values) const;
-  // Reads rows of a column of width 1 as flags [count]: 1 where the number is not zero, else 0.
+  // Reads rows of a column of width 1 as flags [count]: 0 or 1, and kNoFlag where the number is neither.
+  static constexpr std::uint8_t kNoFlag = 2;
   absl::Status ReadFlags(std::int64_t first, int count, std::uint8_t* flags) const;
 
  private:

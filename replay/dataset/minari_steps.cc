@@ -85,7 +85,7 @@ class MinariSteps : public StepSource {
   std::int64_t rows() const override { return rows_; }
   int observation_size() const override { return observation_size_; }
   int action_width() const override { return action_width_; }
-  BadRows bad_rows() const override { return bad_rows_; }
+  RowFaults faults() const override { return faults_; }
 
   absl::StatusOr<absl::Span<const Step>> NextSteps() override {
     steps_.clear();
@@ -120,7 +120,9 @@ class MinariSteps : public StepSource {
     truncations_.resize(count);
     RETURN_IF_ERROR(columns_->terminations.ReadFlags(next_step_, count, terminations_.data()));
     RETURN_IF_ERROR(columns_->truncations.ReadFlags(next_step_, count, truncations_.data()));
-    bad_.assign(count + 1, 0);
+    marks_.assign(count + 1, 0);
+    MarkBadFlags(absl::MakeSpan(terminations_), marks_.data());
+    MarkBadFlags(absl::MakeSpan(truncations_), marks_.data());
     if (!flags_only_) {
       RETURN_IF_ERROR(ReadFloats(columns_->observations, count + 1, &observations_));
       RETURN_IF_ERROR(ReadFloats(columns_->actions, count, &actions_));
@@ -137,12 +139,12 @@ class MinariSteps : public StepSource {
   absl::Status ReadFloats(const Hdf5Column& column, int count, std::vector<float>* values) {
     values->resize(std::size_t{1} * count * column.width());
     RETURN_IF_ERROR(column.ReadFloats(next_step_, count, values->data()));
-    MarkNonFinite(*values, column.width(), &bad_);
+    MarkNotFinite(*values, column.width(), &marks_);
     return absl::OkStatus();
   }
 
   Step StepAt(int i, bool last) const {
-    Step step{.has_next = true, .bad = bad_[i] || bad_[i + 1]};
+    Step step{.has_next = true, .bad = marks_[i] != 0 || marks_[i + 1] != 0};
     if (terminations_[i]) {
       step.end = StepEnd::kTerminal;
     } else if (truncations_[i] || last) {  // where a group ends, its episode does
@@ -158,10 +160,8 @@ class MinariSteps : public StepSource {
 
   // The observation behind the last step belongs to that step's row.
   void CountBadRows(int count, bool last) {
-    if (last && bad_[count]) bad_[count - 1] = 1;
-    for (int i = 0; i < count; ++i) {
-      if (bad_[i] && bad_rows_.count++ == 0) bad_rows_.first = first_row_ + i;
-    }
+    if (last) marks_[count - 1] |= marks_[count];
+    CountMarks(absl::MakeConstSpan(marks_).first(count), first_row_, &faults_);
   }
 
   const Hdf5File& file_;
@@ -176,9 +176,9 @@ class MinariSteps : public StepSource {
   std::int64_t next_step_ = 0;             // of the episode being read
   std::int64_t first_row_ = 0;             // of the file, counting steps: the row of next_step_
   std::vector<float> observations_, actions_, rewards_;
-  std::vector<std::uint8_t> terminations_, truncations_, bad_;
+  std::vector<std::uint8_t> terminations_, truncations_, marks_;
   std::vector<Step> steps_;
-  BadRows bad_rows_;
+  RowFaults faults_;
 };
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "replay/dataset/row_window.h"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -73,22 +72,6 @@ absl::StatusOr<FlatColumns> FlatColumns::Open(const Hdf5File& file, bool with_ne
   return columns;
 }
 
-void MarkNonFinite(absl::Span<const float> values, int width, std::vector<std::uint8_t>* bad) {
-  constexpr std::uint32_t kInfinity = 0x7f800000;
-  const auto magnitude = [&](std::size_t i) {
-    std::uint32_t bits;
-    std::memcpy(&bits, &values[i], sizeof(bits));
-    return bits & 0x7fffffffu;
-  };
-  // The bits of a float without its sign rise with its size, infinities and NaN last: one maximum tells all.
-  std::uint32_t greatest = 0;
-  for (std::size_t i = 0; i < values.size(); ++i) greatest = std::max(greatest, magnitude(i));
-  if (greatest < kInfinity) return;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (magnitude(i) >= kInfinity) (*bad)[i / width] = 1;
-  }
-}
-
 RowWindow::RowWindow(FlatColumns columns, bool flags_only)
     : columns_(std::move(columns)), flags_only_(flags_only) {}
 
@@ -104,22 +87,23 @@ absl::StatusOr<bool> RowWindow::Advance() {
 }
 
 absl::Status RowWindow::Fill(int kept, int count) {
+  const std::uint8_t kept_mark = kept > 0 ? marks_[rows_ - 1] : 0;
+  marks_.assign(kept + count, 0);
   RETURN_IF_ERROR(FillFlags(columns_.terminals, kept, count, &terminals_));
   if (columns_.timeouts.has_value()) RETURN_IF_ERROR(FillFlags(*columns_.timeouts, kept, count, &timeouts_));
-  const std::uint8_t kept_bad = kept > 0 ? bad_[rows_ - 1] : 0;
-  bad_.assign(kept + count, 0);
-  if (flags_only_) return absl::OkStatus();
+  if (!flags_only_) RETURN_IF_ERROR(FillValues(kept, count));
+  CountMarks(absl::MakeConstSpan(marks_).subspan(kept), next_row_, &faults_);
+  if (kept > 0) marks_[0] = kept_mark;
+  return absl::OkStatus();
+}
+
+absl::Status RowWindow::FillValues(int kept, int count) {
   RETURN_IF_ERROR(FillFloats(columns_.observations, kept, count, &observations_));
   RETURN_IF_ERROR(FillFloats(columns_.actions, kept, count, &actions_));
   RETURN_IF_ERROR(FillFloats(columns_.rewards, kept, count, &rewards_));
   if (columns_.next_observations.has_value()) {
     RETURN_IF_ERROR(FillFloats(*columns_.next_observations, kept, count, &next_observations_));
   }
-  for (int i = kept; i < kept + count; ++i) {
-    if (bad_[i] == 0) continue;
-    if (bad_rows_.count++ == 0) bad_rows_.first = next_row_ + i - kept;
-  }
-  if (kept > 0) bad_[0] = kept_bad;
   return absl::OkStatus();
 }
 
@@ -129,7 +113,7 @@ absl::Status RowWindow::FillFloats(const Hdf5Column& column, int kept, int count
   values->resize(std::max(values->size(), (kept + count) * width));
   if (kept > 0) std::copy_n(values->data() + (rows_ - 1) * width, width, values->data());
   RETURN_IF_ERROR(column.ReadFloats(next_row_, count, values->data() + kept * width));
-  MarkNonFinite({values->data(), (kept + count) * width}, column.width(), &bad_);
+  MarkNotFinite({values->data(), (kept + count) * width}, column.width(), &marks_);
   return absl::OkStatus();
 }
 
@@ -137,7 +121,9 @@ absl::Status RowWindow::FillFlags(const Hdf5Column& column, int kept, int count,
                                   std::vector<std::uint8_t>* flags) {
   flags->resize(std::max<std::size_t>(flags->size(), kept + count));
   if (kept > 0) (*flags)[0] = (*flags)[rows_ - 1];
-  return column.ReadFlags(next_row_, count, flags->data() + kept);
+  RETURN_IF_ERROR(column.ReadFlags(next_row_, count, flags->data() + kept));
+  MarkBadFlags(absl::MakeSpan(*flags).subspan(kept, count), marks_.data() + kept);
+  return absl::OkStatus();
 }
 
 }  // namespace dbr

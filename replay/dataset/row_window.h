@@ -10,7 +10,7 @@
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
 #include "replay/dataset/hdf5_file.h"
-#include "replay/dataset/step_source.h"
+#include "replay/dataset/row_faults.h"
 
 namespace dbr {
 
@@ -27,10 +27,6 @@ struct FlatColumns {
   std::optional<Hdf5Column> timeouts;
   std::optional<Hdf5Column> next_observations;
 };
-
-// Sets bad[i] to 1 where row i of `values` [rows x width] has a value that is not finite. Fast where none
-// has.
-void MarkNonFinite(absl::Span<const float> values, int width, std::vector<std::uint8_t>* bad);
 
 // Rows in float32, a stretch at a time; the last row of one stretch is the first of the next, for a
 // transition needs two:
@@ -64,16 +60,17 @@ class RowWindow {
   float reward(int i) const { return flags_only_ ? 0 : rewards_[i]; }
   bool terminal(int i) const { return terminals_[i] != 0; }
   bool timeout(int i) const { return columns_.timeouts.has_value() && timeouts_[i] != 0; }
-  bool bad(int i) const { return bad_[i] != 0; }
+  bool bad(int i) const { return marks_[i] != 0; }
 
   const FlatColumns& columns() const { return columns_; }
-  BadRows bad_rows() const { return bad_rows_; }
+  RowFaults faults() const { return faults_; }
 
  private:
   const float* At(const std::vector<float>& values, const Hdf5Column& column, int i) const {
     return flags_only_ ? nullptr : values.data() + std::size_t{1} * i * column.width();
   }
   absl::Status Fill(int kept, int count);
+  absl::Status FillValues(int kept, int count);
   absl::Status FillFloats(const Hdf5Column& column, int kept, int count, std::vector<float>* values);
   absl::Status FillFlags(const Hdf5Column& column, int kept, int count, std::vector<std::uint8_t>* flags);
 
@@ -82,8 +79,8 @@ class RowWindow {
   std::int64_t next_row_ = 0;  // of the file, to be read next
   int rows_ = 0;               // in the window
   std::vector<float> observations_, actions_, rewards_, next_observations_;
-  std::vector<std::uint8_t> terminals_, timeouts_, bad_;
-  BadRows bad_rows_;
+  std::vector<std::uint8_t> terminals_, timeouts_, marks_;
+  RowFaults faults_;
 };
 
 }  // namespace dbr

@@ -8,6 +8,7 @@
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
 #include "replay/dataset/hdf5_file.h"
+#include "replay/dataset/row_faults.h"
 
 namespace dbr {
 
@@ -23,16 +24,10 @@ struct Step {
   float reward = 0;
   StepEnd end = StepEnd::kNone;
   bool has_next = false;  // it is a transition
-  bool bad = false;       // a row that it takes values from has one that is not finite
+  bool bad = false;       // a row that it takes values from is bad (RowFaults)
   // The next step ends the episode without being a transition: this one is the episode's last transition.
   bool last_transition = false;
   float following_reward = 0;  // the next step's reward, where last_transition; else 0
-};
-
-// Rows with values that are not finite, among those read so far.
-struct BadRows {
-  std::int64_t count = 0;
-  std::int64_t first = -1;  // number of the first one; -1: none
 };
 
 struct StepSourceOptions {
@@ -54,7 +49,7 @@ class StepSource {
   // file cannot be read.
   virtual absl::StatusOr<absl::Span<const Step>> NextSteps() = 0;
 
-  virtual BadRows bad_rows() const = 0;
+  virtual RowFaults faults() const = 0;
 };
 
 // Each opens the steps of a layout. InvalidArgument where keys, shapes or lengths are not the layout's. The

@@ -42,8 +42,9 @@ void LogSeedBuffer(const std::string& path, const SeedBufferRecord& seed_buffer)
       "rows/s",
       path, seed_buffer.rows, seed_buffer.episodes, seed_buffer.return_mean, seed_buffer.rows_per_second);
   if (seed_buffer.bad_rows > 0)
-    spdlog::warn("seed buffer {}: {} rows with values that are not finite are left out", path,
-                 seed_buffer.bad_rows);
+    spdlog::warn(
+        "seed buffer {}: {} bad rows (a value is not finite, or a flag neither 0 nor 1) are left out", path,
+        seed_buffer.bad_rows);
 }
 
 absl::Status Serve(const ServiceArguments& arguments, const Config& config) {

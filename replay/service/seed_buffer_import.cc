@@ -70,7 +70,7 @@ absl::StatusOr<std::unique_ptr<DatasetReader>> OpenFitting(const SeedBufferOptio
 }
 
 SeedBufferRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
-  return {.bad_rows = static_cast<std::uint64_t>(facts.non_finite),
+  return {.bad_rows = static_cast<std::uint64_t>(facts.bad_rows),
           .episodes = static_cast<std::uint64_t>(facts.episodes),
           .return_mean = facts.return_mean,
           .return_std = facts.return_std,

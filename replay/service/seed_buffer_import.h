@@ -18,7 +18,7 @@ struct SeedBufferOptions {
   std::string env;             // name of the environment that the data must come from
   float discount = 0.99f;      // of transitions after which the task goes on
   bool evict = false;          // let the seed buffer's rows make room as others do
-  bool skip_bad_rows = false;  // else a row with a value that is not finite is an error
+  bool skip_bad_rows = false;  // else a bad row (replay/dataset/dataset_reader.h) is an error
   // Rows that the file must have at least; other than 0 where the first draw will wait for so many while
   // there is nothing but the seed buffer.
   std::uint64_t min_rows = 0;

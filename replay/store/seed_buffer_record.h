@@ -11,7 +11,8 @@ struct SeedBufferRecord {
   std::uint64_t complete = 0;  // 1 once all of the seed buffer is in the store
   std::uint64_t rows = 0;      // rows of the seed buffer, with the keys 1 to `rows`
   std::uint64_t pinned = 0;    // how many of them are never evicted: all or none
-  std::uint64_t bad_rows = 0;  // rows of the file that were left out, with values that are not finite
+  // Rows of the file that were left out: a value is not finite, or a flag neither 0 nor 1.
+  std::uint64_t bad_rows = 0;
   std::uint64_t episodes = 0;  // whole ones
   double return_mean = 0;
   double return_std = 0;

@@ -24,7 +24,8 @@ DatasetReport SmallReport() {
   report.facts.episodes = 30;
   report.facts.terminals = 20;
   report.facts.timeouts = 10;
-  report.facts.non_finite = 2;
+  report.facts.bad_rows = 2;
+  report.facts.bad_flags = 1;
   report.facts.return_mean = 1078.25;
   report.facts.return_std = 3.5;
   report.facts.return_min = -1;
@@ -36,7 +37,7 @@ TEST(DatasetReportTest, JsonHasTheNamedFieldsInOrder) {
   EXPECT_EQ(
       DatasetJson(SmallReport()).dump(),
       R"({"layout":"d4rl_pybullet","rows":12345,"transitions":12000,"episodes":30,"terminals":20,"timeouts":10,)"
-      R"("non_finite":2,"return":{"mean":1078.25,"std":3.5,"min":-1.0,"max":2000.0}})");
+      R"("non_finite":2,"bad_flags":1,"return":{"mean":1078.25,"std":3.5,"min":-1.0,"max":2000.0}})");
 }
 
 TEST(DatasetReportTest, JsonWithoutEpisodesHasNoReturns) {
@@ -49,7 +50,7 @@ TEST(DatasetReportTest, TextSaysItForPeople) {
   EXPECT_THAT(DatasetText(SmallReport()),
               AllOf(HasSubstr("d4rl_pybullet"), HasSubstr("hopper"), HasSubstr("12,345"),
                     HasSubstr("30 (20 ended by a terminal, 10 by the time limit)"),
-                    HasSubstr("1078.2 ± 3.5 (from -1.0 to 2000.0)"), HasSubstr("2 rows")));
+                    HasSubstr("1078.2 ± 3.5 (from -1.0 to 2000.0)"), HasSubstr("bad rows     2 (")));
 }
 
 TEST(ProgressBarTest, SaysHowFarHowFastAndHowLong) {

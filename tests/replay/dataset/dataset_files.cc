@@ -65,8 +65,9 @@ std::vector<TestEpisode> MakeEpisodes(std::uint64_t seed, int steps) {
   return episodes;
 }
 
-RawFile::RawFile(const std::string& path)
-    : file_(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT)) {
+RawFile::RawFile(const std::string& path, Opening opening)
+    : file_(opening == Opening::kNew ? H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT)
+                                     : H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT)) {
   DBR_CHECK(file_ >= 0);
 }
 
@@ -78,6 +79,10 @@ void RawFile::Group(const std::string& name) {
   const hid_t group = H5Gcreate2(file_, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   DBR_CHECK(group >= 0);
   H5Gclose(group);
+}
+
+void RawFile::Remove(const std::string& name) {
+  DBR_CHECK(H5Ldelete(file_, name.c_str(), H5P_DEFAULT) >= 0);
 }
 
 void RawFile::Array(const std::string& key, const std::vector<float>& values, int width,
@@ -262,7 +267,7 @@ void ExpectSame(const Reading& actual, const Reading& expected) {
   EXPECT_EQ(actual.facts.episodes, expected.facts.episodes);
   EXPECT_EQ(actual.facts.terminals, expected.facts.terminals);
   EXPECT_EQ(actual.facts.timeouts, expected.facts.timeouts);
-  EXPECT_EQ(actual.facts.non_finite, expected.facts.non_finite);
+  EXPECT_EQ(actual.facts.bad_rows, expected.facts.bad_rows);
   if (expected.facts.episodes == 0) return;
   EXPECT_NEAR(actual.facts.return_mean, expected.facts.return_mean, 1e-9);
   EXPECT_NEAR(actual.facts.return_std, expected.facts.return_std, 1e-9);

@@ -48,10 +48,15 @@ class RawFile {
     int gzip = 0;        // needs chunks
   };
 
-  explicit RawFile(const std::string& path);
+  enum class Opening { kNew, kAdd };  // kAdd: to a file that is there
+
+  explicit RawFile(const std::string& path, Opening opening = Opening::kNew);
   ~RawFile();
 
+  hid_t id() const { return file_; }
+
   void Group(const std::string& name);
+  void Remove(const std::string& name);
   // [rows x width], or [rows] for width 0.
   void Array(const std::string& key, const std::vector<float>& values, int width, const Storage& storage);
   void Array(const std::string& key, const std::vector<float>& values, int width) {

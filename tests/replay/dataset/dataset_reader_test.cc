@@ -271,7 +271,7 @@ TEST_F(DatasetReaderTest, NamesAndCountsRowsThatAreNotFinite) {
   Reading expected = Expected(episodes_, kDiscount);
   for (const int row : {70, 60, 40}) expected.rows.erase(expected.rows.begin() + row);
   EXPECT_EQ(reading->rows, expected.rows);
-  EXPECT_EQ(reading->facts.non_finite, 3);
+  EXPECT_EQ(reading->facts.bad_rows, 3);
   EXPECT_EQ(reading->facts.transitions, static_cast<std::int64_t>(expected.rows.size()));
   EXPECT_TRUE(std::isfinite(reading->facts.return_mean));
 }
