@@ -9,7 +9,8 @@
 namespace dbr {
 
 // kD4rl: row t holds an observation, the action taken there, the reward that this action earned, and whether
-// the task ended with it (`terminals`; where given also `timeouts` and `next_observations`).
+// the task ended with it (`terminals`; where given also `next_observations`, and `timeouts` or
+// `episode_terminals`, which marks the last row of every episode).
 // kD4rlPybullet: row t holds an observation, the action taken there, and the reward and terminal flag
 // received ON ARRIVING at this observation; an episode has one row more than steps, the last with a zero
 // action. kMinari: a group for each episode, with one observation more than actions. The first two have the

@@ -138,11 +138,12 @@ std::optional<std::int64_t> Hdf5File::Number(const std::string& attribute) const
   return number;
 }
 
-std::vector<std::string> Hdf5File::Keys() const {
+std::vector<std::string> Hdf5File::Keys(const std::string& group) const {
   SilenceHdf5();
   std::vector<std::string> names;
   hsize_t at = 0;
-  H5Literate(file_.get(), H5_INDEX_NAME, H5_ITER_NATIVE, &at, AddName, &names);
+  H5Literate_by_name(file_.get(), group.empty() ? "/" : group.c_str(), H5_INDEX_NAME, H5_ITER_NATIVE, &at,
+                     AddName, &names, H5P_DEFAULT);
   std::sort(names.begin(), names.end());
   return names;
 }
@@ -153,6 +154,14 @@ bool Hdf5File::Has(const std::string& key) const {
   if (slash != std::string::npos && H5Lexists(file_.get(), key.substr(0, slash).c_str(), H5P_DEFAULT) <= 0)
     return false;
   return H5Lexists(file_.get(), key.c_str(), H5P_DEFAULT) > 0;
+}
+
+bool Hdf5File::IsArray(const std::string& key) const {
+  SilenceHdf5();
+  const Hdf5Id array(H5Dopen2(file_.get(), key.c_str(), H5P_DEFAULT), H5Dclose);
+  if (!array.ok()) return false;
+  const Hdf5Id space(H5Dget_space(array.get()), H5Sclose);
+  return H5Sget_simple_extent_ndims(space.get()) > 0;
 }
 
 absl::StatusOr<Hdf5Column> Hdf5File::Column(const std::string& key) const {

@@ -51,10 +51,12 @@ class Hdf5File {
   std::optional<std::string> Text(const std::string& attribute) const;
   std::optional<std::int64_t> Number(const std::string& attribute) const;
 
-  // Names in the root, sorted.
-  std::vector<std::string> Keys() const;
+  // Names in a group, "" for the root, sorted; none where it is no group.
+  std::vector<std::string> Keys(const std::string& group = "") const;
   // Whether "key" or "group/key" is there.
   bool Has(const std::string& key) const;
+  // Whether `key` leads to an array of one dimension or more.
+  bool IsArray(const std::string& key) const;
 
   // InvalidArgument where `key` is no array [rows] or [rows, width] of numbers.
   absl::StatusOr<Hdf5Column> Column(const std::string& key) const;

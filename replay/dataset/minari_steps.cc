@@ -13,6 +13,7 @@
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include "core/status_macros.h"
+#include "replay/dataset/end_keys.h"
 #include "replay/dataset/row_window.h"
 #include "replay/dataset/step_source.h"
 
@@ -33,6 +34,7 @@ std::string GroupName(std::int64_t episode) {
 }
 
 absl::Status CheckKeys(const Hdf5File& file, const std::string& group) {
+  RETURN_IF_ERROR(CheckEndKeys(file, group, {"terminations", "truncations"}));
   std::vector<std::string> missing;
   for (const char* const array : kArrays) {
     if (!file.Has(absl::StrCat(group, "/", array))) missing.push_back(absl::StrCat("'", array, "'"));

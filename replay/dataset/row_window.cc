@@ -6,13 +6,22 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "core/status_macros.h"
+#include "replay/dataset/end_keys.h"
 
 namespace dbr {
 namespace {
 
 constexpr int kMaxKeysInMessage = 12;
+constexpr char kEpisodeTerminals[] = "episode_terminals";
+constexpr absl::string_view kEndKeys[] = {"terminals", "timeouts", kEpisodeTerminals};
 
 absl::Status CheckKeys(const Hdf5File& file) {
+  RETURN_IF_ERROR(CheckEndKeys(file, "", kEndKeys));
+  if (file.Has("timeouts") && file.Has(kEpisodeTerminals)) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        file.path(), ": expected one of 'timeouts' and 'episode_terminals', found both; take the ",
+        "one out that does not hold"));
+  }
   std::vector<std::string> missing;
   for (const char* key : {"observations", "actions", "rewards", "terminals"}) {
     if (!file.Has(key)) missing.push_back(absl::StrCat("'", key, "'"));
@@ -52,8 +61,10 @@ absl::StatusOr<FlatColumns> FlatColumns::Open(const Hdf5File& file, bool with_ne
   ASSIGN_OR_RETURN(columns.rewards, file.Column("rewards"));
   ASSIGN_OR_RETURN(columns.terminals, file.Column("terminals"));
   std::vector<const Hdf5Column*> scalars = {&columns.rewards, &columns.terminals};
-  if (file.Has("timeouts")) {
-    ASSIGN_OR_RETURN(columns.timeouts, file.Column("timeouts"));
+  for (const char* const key : {"timeouts", kEpisodeTerminals}) {
+    if (!file.Has(key)) continue;
+    ASSIGN_OR_RETURN(columns.timeouts, file.Column(key));
+    columns.timeouts_at_every_end = key == kEpisodeTerminals;
     scalars.push_back(&*columns.timeouts);
   }
   for (const Hdf5Column* const column : scalars) {
@@ -91,10 +102,20 @@ absl::Status RowWindow::Fill(int kept, int count) {
   marks_.assign(kept + count, 0);
   RETURN_IF_ERROR(FillFlags(columns_.terminals, kept, count, &terminals_));
   if (columns_.timeouts.has_value()) RETURN_IF_ERROR(FillFlags(*columns_.timeouts, kept, count, &timeouts_));
+  if (columns_.timeouts_at_every_end) KeepCuts(kept, count);
   if (!flags_only_) RETURN_IF_ERROR(FillValues(kept, count));
   CountMarks(absl::MakeConstSpan(marks_).subspan(kept), next_row_, &faults_);
   if (kept > 0) marks_[0] = kept_mark;
   return absl::OkStatus();
+}
+
+// Makes marks of the last rows of episodes marks of cuts. A terminal that no episode ends with contradicts
+// itself.
+void RowWindow::KeepCuts(int kept, int count) {
+  for (int i = kept; i < kept + count; ++i) {
+    if (terminals_[i] != 0 && timeouts_[i] == 0) marks_[i] |= kBadFlag;
+    if (terminals_[i] != 0) timeouts_[i] = 0;
+  }
 }
 
 absl::Status RowWindow::FillValues(int kept, int count) {

@@ -25,6 +25,8 @@ struct FlatColumns {
   Hdf5Column rewards;
   Hdf5Column terminals;
   std::optional<Hdf5Column> timeouts;
+  // `timeouts` is d3rlpy's `episode_terminals`, which marks the last row of each episode, terminals included.
+  bool timeouts_at_every_end = false;
   std::optional<Hdf5Column> next_observations;
 };
 
@@ -70,6 +72,7 @@ class RowWindow {
     return flags_only_ ? nullptr : values.data() + std::size_t{1} * i * column.width();
   }
   absl::Status Fill(int kept, int count);
+  void KeepCuts(int kept, int count);
   absl::Status FillValues(int kept, int count);
   absl::Status FillFloats(const Hdf5Column& column, int kept, int count, std::vector<float>* values);
   absl::Status FillFlags(const Hdf5Column& column, int kept, int count, std::vector<std::uint8_t>* flags);
