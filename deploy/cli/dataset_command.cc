@@ -89,7 +89,7 @@ void AddInfo(CLI::App* dataset, int* exit_code) {
   command->add_flag("--json", flags->json,
                     "Print one JSON object: {layout, rows, transitions, episodes, terminals, timeouts, "
                     "non_finite, bad_flags, "
-                    "return: {mean, std, min, max}}");
+                    "return: {mean, std, min, max}, actions_outside, warnings}");
   command->footer("Example: dbr dataset info hopper_medium.hdf5 --layout d4rl_pybullet");
   command->callback([flags, exit_code] {
     const absl::StatusOr<int> result = RunInfo(*flags);

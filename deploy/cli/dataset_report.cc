@@ -31,6 +31,7 @@ std::string DatasetText(const DatasetReport& report) {
                            ? "0"
                            : absl::StrCat(WithCommas(facts.bad_rows),
                                           " (a value is not finite, or a flag neither 0 nor 1)")));
+  for (const std::string& warning : WarningsOf(facts)) absl::StrAppend(&text, Line("warning", warning));
   return text;
 }
 
@@ -48,7 +49,9 @@ nlohmann::ordered_json DatasetJson(const DatasetReport& report) {
            {{"mean", facts.return_mean},
             {"std", facts.return_std},
             {"min", facts.return_min},
-            {"max", facts.return_max}}}};
+            {"max", facts.return_max}}},
+          {"actions_outside", facts.actions_outside},
+          {"warnings", WarningsOf(facts)}};
 }
 
 }  // namespace dbr

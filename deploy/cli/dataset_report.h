@@ -16,12 +16,12 @@ struct DatasetReport {
   DatasetFacts facts;
 };
 
-// A line for each fact.
+// A line for each fact, and one for each warning (replay/dataset/dataset_facts.h).
 std::string DatasetText(const DatasetReport& report);
 
 // {layout, rows, transitions, episodes, terminals, timeouts, non_finite, bad_flags, return: {mean, std, min,
-// max}}. `non_finite` counts all bad rows, `bad_flags` those among them with a flag that is neither 0 nor 1.
-// The figures of the return are null where no episode ended.
+// max}, actions_outside, warnings: [text]}. `non_finite` counts all bad rows, `bad_flags` those among them
+// with a flag that is neither 0 nor 1. The figures of the return are null where no episode ended.
 nlohmann::ordered_json DatasetJson(const DatasetReport& report);
 
 }  // namespace dbr

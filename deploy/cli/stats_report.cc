@@ -111,6 +111,10 @@ std::string Sources(const StatsReply& stats) {
                   Fixed(stats.seed_buffer_return_mean(), 1), " ± ", Fixed(stats.seed_buffer_return_std(), 1),
                   " (", Fixed(stats.seed_buffer_return_min(), 1), " to ",
                   Fixed(stats.seed_buffer_return_max(), 1), ")\n");
+  if (stats.seed_buffer_actions_outside() > 0) {
+    absl::StrAppend(&text, "             ", WithCommas(stats.seed_buffer_actions_outside()),
+                    " rows have actions outside [-1, 1]\n");
+  }
   return text;
 }
 
@@ -191,7 +195,8 @@ Json SeedBufferJson(const StatsReply& stats) {
           {"seed_buffer_return_std", Number(stats.seed_buffer_return_std())},
           {"seed_buffer_return_min", Number(stats.seed_buffer_return_min())},
           {"seed_buffer_return_max", Number(stats.seed_buffer_return_max())},
-          {"seed_buffer_rows_per_second", Number(stats.seed_buffer_rows_per_second())}};
+          {"seed_buffer_rows_per_second", Number(stats.seed_buffer_rows_per_second())},
+          {"seed_buffer_actions_outside", stats.seed_buffer_actions_outside()}};
 }
 
 Json EdgesJson(const StatsReply& stats) {

@@ -224,6 +224,7 @@ void Launch::TellOfTheSeedBuffer() {
   if (seed_buffer.bad_rows > 0)
     Say(absl::StrCat(WithCommas(seed_buffer.bad_rows),
                      " bad rows (a value is not finite, or a flag neither 0 nor 1) are left out"));
+  for (const std::string& warning : SeedBufferWarnings(seed_buffer)) Say(warning);
 }
 
 absl::Status Launch::WaitUntilServing(const std::string& name, const std::string& address,

@@ -52,7 +52,8 @@ Json SeedBufferJson(const SeedBufferSummary& seed_buffer) {
           {"bad_rows", seed_buffer.bad_rows},
           {"episodes", seed_buffer.episodes},
           {"return", returns},
-          {"rows_per_second", Number(seed_buffer.rows_per_second)}};
+          {"rows_per_second", Number(seed_buffer.rows_per_second)},
+          {"actions_outside", seed_buffer.actions_outside}};
 }
 
 Json ReturnsJson(const RunSummary& summary) {

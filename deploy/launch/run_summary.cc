@@ -1,5 +1,8 @@
 #include "deploy/launch/run_summary.h"
 
+#include "absl/strings/str_cat.h"
+#include "deploy/terminal/terminal.h"
+
 namespace dbr {
 
 std::vector<EvaluationPoint> RunSummary::Update(const RunSample& sample) {
@@ -15,12 +18,28 @@ std::vector<EvaluationPoint> RunSummary::Update(const RunSample& sample) {
     seed_buffer.return_min = replay.seed_buffer_return_min();
     seed_buffer.return_max = replay.seed_buffer_return_max();
     seed_buffer.rows_per_second = replay.seed_buffer_rows_per_second();
+    seed_buffer.actions_outside = replay.seed_buffer_actions_outside();
   }
   if (sample.learner.has_value()) {
     updates = sample.learner->updates();
     policy_version = sample.learner->policy_version();
   }
   return curve.Update(sample);
+}
+
+std::vector<std::string> SeedBufferWarnings(const SeedBufferSummary& seed_buffer) {
+  std::vector<std::string> warnings;
+  if (seed_buffer.rows > 0 && seed_buffer.episodes == 0) {
+    warnings.emplace_back(
+        "warning: no episode ends in the seed buffer, as if all its rows were one. Are the ends lost, or "
+        "under another key? dbr dataset info shows what the file holds");
+  }
+  if (seed_buffer.actions_outside > 0) {
+    warnings.push_back(absl::StrCat("warning: ", WithCommas(seed_buffer.actions_outside),
+                                    " rows of the seed buffer have actions outside [-1, 1], the range of ",
+                                    "the environment; they are taken as they are"));
+  }
+  return warnings;
 }
 
 std::optional<EvaluationPoint> RunSummary::AfterOffline() const {

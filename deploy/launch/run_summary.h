@@ -23,7 +23,12 @@ struct SeedBufferSummary {
   std::uint64_t episodes = 0;                                              // whole ones
   double return_mean = 0, return_std = 0, return_min = 0, return_max = 0;  // over the whole episodes
   double rows_per_second = 0;
+  std::uint64_t actions_outside = 0;  // rows with an action outside [-1, 1]
 };
+
+// What a user should know of a seed buffer before it is trained on, a line each: that no episode ends in it,
+// that actions lie outside the range.
+std::vector<std::string> SeedBufferWarnings(const SeedBufferSummary& seed_buffer);
 
 // What summary.json holds. Counters and evaluations go on over --resume. A copyable value.
 struct RunSummary {

@@ -90,7 +90,8 @@ SeedBufferSummary ReadSeedBuffer(const Json& json) {
           .return_std = Real(returns, "std", kNaN),
           .return_min = Real(returns, "min", kNaN),
           .return_max = Real(returns, "max", kNaN),
-          .rows_per_second = Real(json, "rows_per_second", kNaN)};
+          .rows_per_second = Real(json, "rows_per_second", kNaN),
+          .actions_outside = Count(json, "actions_outside")};
 }
 
 // Empty where the text is no object or does not say it.

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <limits>
+#include <string>
+#include <vector>
 
 namespace dbr {
 
@@ -15,7 +17,8 @@ struct DatasetFacts {
   std::int64_t timeouts = 0;   // cuts at the time limit
   // Rows with a NaN or an infinite value, or with a flag that is neither 0 nor 1.
   std::int64_t bad_rows = 0;
-  std::int64_t bad_flags = 0;  // of them, those with such a flag
+  std::int64_t bad_flags = 0;        // of them, those with such a flag
+  std::int64_t actions_outside = 0;  // rows, not bad, with an action outside [-1, 1]
   // Statistics of the undiscounted returns of the episodes that ended and have no such row; NaN where there
   // are none.
   double return_mean = std::numeric_limits<double>::quiet_NaN();
@@ -23,5 +26,9 @@ struct DatasetFacts {
   double return_min = std::numeric_limits<double>::quiet_NaN();
   double return_max = std::numeric_limits<double>::quiet_NaN();
 };
+
+// What a user should know before the data is trained on, one sentence or two each: that no episode ends, that
+// actions lie outside the range. Call it when all is read.
+std::vector<std::string> WarningsOf(const DatasetFacts& facts);
 
 }  // namespace dbr

@@ -129,6 +129,7 @@ void DatasetReader::State::TakeFaults() {
   const RowFaults faults = source->faults();
   facts.bad_rows = faults.bad;
   facts.bad_flags = faults.bad_flags;
+  facts.actions_outside = faults.actions_outside;
 }
 
 absl::Status DatasetReader::State::Fill(TransitionChunk* chunk) {

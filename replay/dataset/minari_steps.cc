@@ -164,6 +164,7 @@ class MinariSteps : public StepSource {
   void CountBadRows(int count, bool last) {
     if (last) marks_[count - 1] |= marks_[count];
     CountMarks(absl::MakeConstSpan(marks_).first(count), first_row_, &faults_);
+    if (!flags_only_) faults_.actions_outside += CountOutside(actions_, action_width_, marks_.data());
   }
 
   const Hdf5File& file_;

@@ -125,6 +125,9 @@ absl::Status RowWindow::FillValues(int kept, int count) {
   if (columns_.next_observations.has_value()) {
     RETURN_IF_ERROR(FillFloats(*columns_.next_observations, kept, count, &next_observations_));
   }
+  const std::size_t width = columns_.actions.width();
+  faults_.actions_outside += CountOutside(absl::MakeConstSpan(actions_).subspan(kept * width, count * width),
+                                          columns_.actions.width(), marks_.data() + kept);
   return absl::OkStatus();
 }
 

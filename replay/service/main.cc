@@ -15,6 +15,7 @@
 #include "envs/registry/registry.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/service_main.h"
+#include "replay/dataset/dataset_facts.h"
 #include "replay/service/replay_server.h"
 
 namespace dbr {
@@ -45,6 +46,11 @@ void LogSeedBuffer(const std::string& path, const SeedBufferRecord& seed_buffer)
     spdlog::warn(
         "seed buffer {}: {} bad rows (a value is not finite, or a flag neither 0 nor 1) are left out", path,
         seed_buffer.bad_rows);
+  DatasetFacts facts;
+  facts.transitions = static_cast<std::int64_t>(seed_buffer.rows);
+  facts.episodes = static_cast<std::int64_t>(seed_buffer.episodes);
+  facts.actions_outside = static_cast<std::int64_t>(seed_buffer.actions_outside);
+  for (const std::string& warning : WarningsOf(facts)) spdlog::warn("seed buffer {}: {}", path, warning);
 }
 
 absl::Status Serve(const ServiceArguments& arguments, const Config& config) {

@@ -76,7 +76,8 @@ SeedBufferRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
           .return_std = facts.return_std,
           .return_min = facts.return_min,
           .return_max = facts.return_max,
-          .rows_per_second = static_cast<double>(facts.transitions) / absl::ToDoubleSeconds(elapsed)};
+          .rows_per_second = static_cast<double>(facts.transitions) / absl::ToDoubleSeconds(elapsed),
+          .actions_outside = static_cast<std::uint64_t>(facts.actions_outside)};
 }
 
 // The file's rows [n x stride], as the buffer lays them, with returns where it wants them.

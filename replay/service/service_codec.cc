@@ -92,6 +92,7 @@ void EncodeSeedBuffer(const BufferStats& stats, StatsReply* reply) {
   reply->set_seed_buffer_return_min(number(record.return_min));
   reply->set_seed_buffer_return_max(number(record.return_max));
   reply->set_seed_buffer_rows_per_second(record.rows_per_second);
+  reply->set_seed_buffer_actions_outside(record.actions_outside);
 }
 
 }  // namespace

@@ -19,6 +19,8 @@ struct SeedBufferRecord {
   double return_min = 0;
   double return_max = 0;
   double rows_per_second = 0;  // the speed at which they were loaded
+  // Rows of the file with an action outside [-1, 1]; 0 where an older program wrote the record.
+  std::uint64_t actions_outside = 0;
 };
 
 }  // namespace dbr

@@ -22,7 +22,7 @@ constexpr std::size_t kSectionAlignment = 64;
 // The buffer's four partitions index every row with 8 bytes each.
 constexpr std::uint64_t kIndexBytes = 32;
 
-std::size_t Aligned(std::size_t bytes) {
+constexpr std::size_t Aligned(std::size_t bytes) {
   return (bytes + kSectionAlignment - 1) / kSectionAlignment * kSectionAlignment;
 }
 
@@ -89,6 +89,7 @@ TransitionStore::TransitionStore(const TransitionLayout& layout, std::uint64_t c
   const auto take = [&section](std::size_t bytes) {
     return std::exchange(section, section + Aligned(bytes));
   };
+  static_assert(Aligned(sizeof(SeedBufferRecord)) == 128, "the format on disk");
   counters_ = reinterpret_cast<StoreCounters*>(take(sizeof(StoreCounters)));
   seed_buffer_ = reinterpret_cast<SeedBufferRecord*>(take(sizeof(SeedBufferRecord)));
   episodes_ = reinterpret_cast<EpisodeEnd*>(take(kRecentEpisodes * sizeof(EpisodeEnd)));

@@ -13,6 +13,7 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 DatasetReport SmallReport() {
   DatasetReport report;
@@ -37,13 +38,32 @@ TEST(DatasetReportTest, JsonHasTheNamedFieldsInOrder) {
   EXPECT_EQ(
       DatasetJson(SmallReport()).dump(),
       R"({"layout":"d4rl_pybullet","rows":12345,"transitions":12000,"episodes":30,"terminals":20,"timeouts":10,)"
-      R"("non_finite":2,"bad_flags":1,"return":{"mean":1078.25,"std":3.5,"min":-1.0,"max":2000.0}})");
+      R"("non_finite":2,"bad_flags":1,"return":{"mean":1078.25,"std":3.5,"min":-1.0,"max":2000.0},)"
+      R"("actions_outside":0,"warnings":[]})");
 }
 
 TEST(DatasetReportTest, JsonWithoutEpisodesHasNoReturns) {
   const nlohmann::ordered_json json = nlohmann::ordered_json::parse(DatasetJson(DatasetReport()).dump());
   EXPECT_TRUE(json["return"]["mean"].is_null());
   EXPECT_EQ(json["episodes"], 0);
+}
+
+TEST(DatasetReportTest, WarnsWhereNoEpisodeEnds) {
+  DatasetReport report;
+  EXPECT_THAT(DatasetText(report), Not(HasSubstr("warning"))) << "an empty file has nothing to warn of";
+  report.facts.transitions = 402;
+  EXPECT_THAT(DatasetText(report), HasSubstr("warning      no episode ends in the file"));
+  EXPECT_THAT(DatasetJson(report)["warnings"][0].get<std::string>(), HasSubstr("no episode ends"));
+  report.facts.episodes = 1;
+  EXPECT_THAT(DatasetText(report), Not(HasSubstr("warning")));
+}
+
+TEST(DatasetReportTest, WarnsOfActionsOutsideTheRange) {
+  DatasetReport report = SmallReport();
+  report.facts.actions_outside = 17;
+  EXPECT_THAT(DatasetText(report), HasSubstr("warning      17 rows have actions outside [-1, 1]"));
+  EXPECT_EQ(DatasetJson(report)["actions_outside"], 17);
+  EXPECT_EQ(DatasetJson(report)["warnings"].size(), 1u);
 }
 
 TEST(DatasetReportTest, TextSaysItForPeople) {

@@ -22,6 +22,7 @@ namespace dbr {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
@@ -186,6 +187,28 @@ TEST(RobotResultsTest, TheSummaryHoldsTheCurveAndThePhases) {
   EXPECT_EQ(read.curve.points()[1].return_mean, 1012);
   EXPECT_TRUE(std::isnan(read.curve.points()[1].score_mean));
   EXPECT_THAT(read.Update(Evaluated(Sample(3100, 1600), 3, 3000, 1500)), IsEmpty()) << "known from before";
+}
+
+TEST(SeedBufferWarningsTest, TellOfEpisodesWithoutEndAndActionsOutsideTheRange) {
+  RunSummary summary;
+  EXPECT_THAT(SeedBufferWarnings(summary.seed_buffer), IsEmpty()) << "there is none";
+  RunSample sample = Sample(0, 0);
+  summary.Update(sample);
+  EXPECT_THAT(SeedBufferWarnings(summary.seed_buffer), IsEmpty());
+  sample.replay->set_seed_buffer_episodes(0);
+  sample.replay->set_seed_buffer_actions_outside(1234);
+  summary.Update(sample);
+  EXPECT_THAT(SeedBufferWarnings(summary.seed_buffer),
+              ElementsAre(HasSubstr("no episode ends in the seed buffer"), HasSubstr("1,234 rows")));
+}
+
+TEST(SeedBufferWarningsTest, TheSummaryKeepsTheCountOfActionsOutside) {
+  const TempDir folder;
+  const RunFolder run{folder.path()};
+  RunSummary summary = Finetuned();
+  summary.seed_buffer.actions_outside = 7;
+  ASSERT_TRUE(WriteSummary(summary, run).ok());
+  EXPECT_EQ(LoadSummary(run)->seed_buffer.actions_outside, 7u);
 }
 
 TEST(SeedBufferStatsTest, TellOfItsShares) {

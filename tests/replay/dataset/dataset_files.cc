@@ -46,7 +46,8 @@ TestEpisode MakeEpisode(std::uint64_t seed, int steps, EpisodeEnding ending) {
   };
   TestEpisode episode;
   episode.observations = draw((steps + 1) * kTestObservationSize);
-  episode.actions = draw(steps * kTestActionWidth);
+  episode.actions.resize(static_cast<std::size_t>(steps) * kTestActionWidth);
+  for (float& value : episode.actions) value = static_cast<float>(2 * rng.Uniform() - 1);
   episode.rewards = draw(steps);
   episode.ending = ending;
   return episode;

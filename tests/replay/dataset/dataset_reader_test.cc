@@ -315,6 +315,27 @@ TEST_F(DatasetReaderTest, CountsABadFinalObservationOfMinariOnce) {
                                      HasSubstr("row " + std::to_string(episodes[0].steps() - 1) + " ")));
 }
 
+TEST_F(DatasetReaderTest, CountsRowsWithActionsOutsideTheRangeInEveryLayout) {
+  std::vector<TestEpisode> episodes = MakeEpisodes(/*seed=*/5, /*steps=*/40000);
+  episodes[0].actions[0] = -7;  // two values of one row
+  episodes[0].actions[1] = 1.25;
+  episodes[1].actions[0] = 1 + 1e-6f;  // what rounding does
+  episodes[2].actions[0] = kInfinity;  // a bad row
+  episodes.back().actions.back() = -1.001f;
+  WriteRaw(folder_ / "d4rl", D4rlColumns(episodes), {});
+  WriteRaw(folder_ / "d4rl_pybullet", PybulletColumns(episodes), {});
+  WriteMinari(folder_ / "minari", episodes);
+  for (const DatasetLayout layout :
+       {DatasetLayout::kD4rl, DatasetLayout::kD4rlPybullet, DatasetLayout::kMinari}) {
+    SCOPED_TRACE(DatasetLayoutName(layout));
+    const absl::StatusOr<Reading> reading =
+        ReadAll(folder_ / DatasetLayoutName(layout), {.layout = layout, .skip_bad_rows = true}, 4096);
+    ASSERT_TRUE(reading.ok()) << reading.status();
+    EXPECT_EQ(reading->facts.actions_outside, 2);
+    EXPECT_EQ(reading->facts.bad_rows, 1);
+  }
+}
+
 TEST_F(DatasetReaderTest, GivesTheSameErrorAgain) {
   RawColumns columns = columns_;
   columns.rewards[0] = kNan;

@@ -278,6 +278,17 @@ TEST_F(SeedBufferImportTest, BadRowsAreRefusedOrCountedAndLeftOut) {
   EXPECT_TRUE(std::isfinite(Stats().seed_buffer_return_mean()));
 }
 
+TEST_F(SeedBufferImportTest, ActionsOutsideTheRangeAreKeptAndCounted) {
+  std::vector<TestEpisode> episodes = episodes_;
+  episodes[1].actions[0] = 1.5;
+  WriteWithWriter(path_, episodes, DatasetLayout::kD4rl);
+  Start();
+  EXPECT_EQ(Stats().total(), rows());
+  EXPECT_EQ(Stats().seed_buffer_actions_outside(), 1u);
+  Start();
+  EXPECT_EQ(Stats().seed_buffer_actions_outside(), 1u) << "the store remembers it";
+}
+
 TEST_F(SeedBufferImportTest, AMissingFileIsSaid) {
   options_.seed_buffer.path = absl::StrCat(folder_.path(), "/none.hdf5");
   const absl::Status status = StartError();

@@ -1,0 +1,23 @@
+#include "replay/dataset/dataset_facts.h"
+
+#include "absl/strings/str_cat.h"
+
+namespace dbr {
+
+std::vector<std::string> WarningsOf(const DatasetFacts& facts) {
+  std::vector<std::string> warnings;
+  if (facts.transitions > 0 && facts.episodes == 0) {
+    warnings.emplace_back(
+        "no episode ends in the file: no flag is 1, as if all rows were one episode without an end. Are the "
+        "ends lost, or under another key?");
+  }
+  if (facts.actions_outside > 0) {
+    warnings.push_back(absl::StrCat(facts.actions_outside,
+                                    " rows have actions outside [-1, 1], the range of the environments; they "
+                                    "are taken as they are. Were ",
+                                    "they recorded with other bounds?"));
+  }
+  return warnings;
+}
+
+}  // namespace dbr
