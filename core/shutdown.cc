@@ -45,9 +45,13 @@ std::thread ThreadWithoutSignals(std::function<void()> run) {
   return thread;
 }
 
-ShutdownWatcher::ShutdownWatcher(std::function<void()> on_signal) {
+int OpenShutdownSignals() {
   const sigset_t set = StopSignals();
-  signal_fd_ = signalfd(-1, &set, SFD_CLOEXEC);
+  return signalfd(-1, &set, SFD_CLOEXEC);
+}
+
+ShutdownWatcher::ShutdownWatcher(std::function<void()> on_signal) {
+  signal_fd_ = OpenShutdownSignals();
   stop_fd_ = eventfd(0, EFD_CLOEXEC);
   DBR_CHECK(signal_fd_ >= 0 && stop_fd_ >= 0);
   thread_ = std::thread([this, on_signal = std::move(on_signal)] {

@@ -22,6 +22,11 @@ void BlockShutdownSignals();
 // that will only block or wait for them later.
 std::thread ThreadWithoutSignals(std::function<void()> run);
 
+// Opens a descriptor that can be read from (poll) while one of the StopSignals() waits to be taken, for whoever
+// waits for something else besides. The caller closes it, and reads nothing from it. -1, with errno, where
+// the system has none left.
+int OpenShutdownSignals();
+
 // Runs `on_signal` in a thread of its own at each of the StopSignals(), until destroyed; the destructor joins
 // the thread. Requires that BlockShutdownSignals() was called before any thread was started.
 class ShutdownWatcher {

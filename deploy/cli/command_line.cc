@@ -4,11 +4,13 @@
 #include <filesystem>
 
 #include "absl/strings/str_cat.h"
+#include "deploy/process/interrupt.h"
 
 namespace dbr {
 
 int Fail(absl::string_view command, const absl::Status& status) {
   std::fprintf(stderr, "dbr %s: %s\n", std::string(command).c_str(), std::string(status.message()).c_str());
+  if (absl::IsCancelled(status)) return kInterruptedExit;
   return absl::IsInvalidArgument(status) ? 2 : 1;
 }
 

@@ -26,7 +26,7 @@ void AddAlgorithms(CLI::App* app, int* exit_code);
 void AddCompletion(CLI::App* app, int* exit_code);
 
 // Prints "dbr COMMAND: MESSAGE" to stderr and gives the exit status: 2 where the user typed or wrote
-// something wrong (InvalidArgument), else 1.
+// something wrong (InvalidArgument), 130 after Ctrl-C (Cancelled), else 1.
 int Fail(absl::string_view command, const absl::Status& status);
 
 // The folder of this program, in which the service programs stand as well: bin of the build folder or of the

@@ -51,7 +51,7 @@ absl::StatusOr<ReferencePosition> ReadPosition(const Json& entry, const std::str
 }  // namespace
 
 absl::StatusOr<std::vector<ReferencePosition>> LoadPositions(const std::string& path) {
-  ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  ASSIGN_OR_RETURN(const std::string text, ReadTextFile(path));
   const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (json.is_discarded())
     return absl::InvalidArgumentError(absl::StrCat(path, ": expected JSON, found something else"));

@@ -84,7 +84,7 @@ absl::StatusOr<Config> Parse(absl::string_view text, const std::vector<std::stri
 }  // namespace
 
 absl::StatusOr<Config> LoadConfig(const std::string& path, const std::vector<std::string>& overrides) {
-  ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  ASSIGN_OR_RETURN(const std::string text, ReadTextFile(path));
   return Parse(text, overrides, path);
 }
 

@@ -15,7 +15,7 @@ namespace dbr {
 // "path.to.field=value", as --set takes it; for a repeated field, "path=[a, b]" or "path=a". Blocks for
 // LoadConfig's reading of the file. Returns InvalidArgument with ALL errors: unknown fields with line, column
 // and the nearest known name, values of another type, and fields out of bounds with path, bounds and value.
-// LoadConfig also returns ReadFile's errors.
+// LoadConfig also returns ReadTextFile's errors.
 absl::StatusOr<Config> LoadConfig(const std::string& path, const std::vector<std::string>& overrides = {});
 absl::StatusOr<Config> ParseConfig(absl::string_view text, const std::vector<std::string>& overrides = {});
 

@@ -22,7 +22,7 @@ absl::StatusOr<Experiment> Parse(absl::string_view text, const std::string& sour
 }  // namespace
 
 absl::StatusOr<Experiment> LoadExperiment(const std::string& path) {
-  ASSIGN_OR_RETURN(const std::string text, ReadFile(path));
+  ASSIGN_OR_RETURN(const std::string text, ReadTextFile(path));
   return Parse(text, path);
 }
 

@@ -1,15 +1,19 @@
 #include "core/file_io.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <filesystem>
 #include <thread>
 
 #include "absl/cleanup/cleanup.h"
+#include "core/shutdown.h"
 #include "tests/support/temp_dir.h"
 
 namespace dbr {
@@ -45,9 +49,94 @@ TEST(FileIoTest, MissingFileOrFolderIsNotFoundAndNamed) {
   EXPECT_THAT(std::string(written.message()), HasSubstr(folder / "none/file"));
 }
 
-TEST(FileIoTest, ReadingAFolderIsAnError) {
+TEST(FileIoTest, WhatIsNoFileIsRefusedAtOnceAndNamed) {
   const TempDir folder;
-  EXPECT_FALSE(ReadFile(folder.path()).ok());
+  const std::string pipe = folder / "pipe";  // that nobody ever writes into
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const std::pair<std::string, std::string> others[] = {
+      {folder.path(), "a folder"}, {pipe, "a pipe"}, {"/dev/zero", "a device"}};
+  for (const auto& [path, kind] : others) {
+    const absl::Status status = ReadFile(path).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_THAT(std::string(status.message()), HasSubstr(path + ": expected a file, found " + kind));
+    if (path != pipe) EXPECT_EQ(ReadTextFile(path).status(), status);
+  }
+}
+
+TEST(FileIoTest, ATextComesFromAPipeHoweverLateItsWriterIs) {
+  const TempDir folder;
+  const std::string path = folder / "pipe", text(300000, 'x');
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  std::string read;
+  std::thread reader([&] { read = ReadTextFile(path).value(); });
+  const int fd = open(path.c_str(), O_WRONLY);  // waits for the reader
+  for (std::size_t at = 0; at < text.size(); at += 100000)
+    EXPECT_EQ(write(fd, text.data() + at, 100000), 100000);
+  close(fd);
+  reader.join();
+  EXPECT_EQ(read, text);
+}
+
+TEST(FileIoTest, AnEndlessPipeIsRefusedAndNotKept) {
+  const TempDir folder;
+  const std::string path = folder / "pipe";
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  const auto old_handler = signal(SIGPIPE, SIG_IGN);
+  const absl::Cleanup restore = [&] { signal(SIGPIPE, old_handler); };
+  std::thread writer([&] {
+    const int fd = open(path.c_str(), O_WRONLY);
+    const std::string piece(1 << 16, 'x');
+    while (write(fd, piece.data(), piece.size()) > 0) {
+    }
+    close(fd);
+  });
+  const absl::Status status = ReadTextFile(path).status();
+  writer.join();
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("at most 16 MiB"));
+}
+
+TEST(FileIoTest, AHugeFileIsRefusedAsText) {
+  const TempDir folder;
+  const std::string path = folder / "file";
+  ASSERT_TRUE(WriteFileAtomically(path, "x").ok());
+  std::filesystem::resize_file(path, std::uintmax_t{1} << 40);  // a hole
+  EXPECT_THAT(std::string(ReadTextFile(path).status().message()), HasSubstr("at most 16 MiB"));
+}
+
+TEST(FileIoTest, ASignalEndsTheWaitForAPipe) {
+  const TempDir folder;
+  const std::string path = folder / "pipe";
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  sigset_t old_mask, term;
+  sigemptyset(&term);
+  sigaddset(&term, SIGTERM);
+  pthread_sigmask(SIG_SETMASK, nullptr, &old_mask);
+  const auto old_handler = signal(SIGPIPE, SIG_DFL);
+  BlockShutdownSignals();
+  kill(getpid(), SIGTERM);
+  EXPECT_EQ(ReadTextFile(path).status().code(), absl::StatusCode::kCancelled);
+  int taken = 0;
+  sigwait(&term, &taken);  // it was left for whoever handles it
+  EXPECT_EQ(taken, SIGTERM);
+  signal(SIGPIPE, old_handler);
+  pthread_sigmask(SIG_SETMASK, &old_mask, nullptr);
+}
+
+TEST(FileIoTest, AByteOrderMarkIsNoPartOfAText) {
+  const TempDir folder;
+  const std::string path = folder / "file";
+  ASSERT_TRUE(WriteFileAtomically(path,
+                                  "\xEF\xBB\xBF"
+                                  "env { }")
+                  .ok());
+  EXPECT_EQ(ReadTextFile(path).value(), "env { }");
+  ASSERT_TRUE(WriteFileAtomically(path,
+                                  "\xFF\xFE"
+                                  "e")
+                  .ok());
+  EXPECT_THAT(std::string(ReadTextFile(path).status().message()),
+              HasSubstr("found UTF-16; save it as UTF-8"));
 }
 
 // A limit on the size of a file fails a write half-way, as a full disk does.

@@ -267,6 +267,15 @@ TEST(LoadConfigTest, ErrorsStartWithTheFile) {
   EXPECT_THAT(std::string(LoadConfig(folder / "none").status().message()), HasSubstr(folder / "none"));
 }
 
+TEST(LoadConfigTest, AByteOrderMarkBeforeTheTextIsPassedOver) {
+  const TempDir folder;
+  const std::string path = folder / "marked.textproto";
+  std::ofstream(path) << "\xEF\xBB\xBFseed: 3";
+  const auto config = LoadConfig(path);
+  ASSERT_TRUE(config.ok()) << config.status();
+  EXPECT_EQ(config->seed(), 3u);
+}
+
 TEST(LoadConfigTest, ReadsAFileWithOverrides) {
   const TempDir folder;
   const std::string path = folder / "good.textproto";
