@@ -87,11 +87,10 @@ absl::Status CheckEndKeys(const Hdf5File& file, const std::string& group,
     if (!TellsOfEnds(key) || std::find(read.begin(), read.end(), key) != read.end()) continue;
     const std::string path = group.empty() ? key : absl::StrCat(group, "/", key);
     if (!file.IsArray(path)) continue;
-    return absl::InvalidArgumentError(
-        absl::StrCat(file.path(), ": expected the ends of episodes in '", absl::StrJoin(read, "' and '"),
-                     "' alone, found '", path,
-                     "' beside them, which other programs use for ends and mean different things by. ",
-                     "Write into those what it says, and take it out of the file."));
+    return absl::InvalidArgumentError(absl::StrCat(
+        file.path(), ": expected the ends of episodes in '", absl::StrJoin(read, "', '"), "' alone, found '",
+        path, "' beside them, which other programs use for ends and mean different things by; ",
+        "write into those what it says, and take it out of the file"));
   }
   return absl::OkStatus();
 }

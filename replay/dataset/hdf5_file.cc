@@ -12,6 +12,7 @@
 #include "absl/strings/string_view.h"
 #include "core/file_io.h"
 #include "core/status_macros.h"
+#include "replay/dataset/hdf5_trouble.h"
 
 namespace dbr {
 namespace {
@@ -20,17 +21,14 @@ constexpr std::size_t kDefaultCacheBytes = std::size_t{1} << 20;
 constexpr std::size_t kMaxCacheBytes = std::size_t{64} << 20;
 constexpr std::size_t kCacheSlots = 521;  // the library's default: a prime
 
-// Checks that the system lets us read the file at all; the library's own words for it are of little help.
+// Checks that the system lets us read the file at all; the library's own words for it are of little help. It
+// would also wait for ever for whoever writes into a pipe.
 absl::Status CheckReadable(const std::string& path) {
-  const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const int fd = open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) return ErrnoStatus(errno, "cannot read", path);
+  const absl::Status regular = CheckRegularFile(fd, path);
   close(fd);
-  return absl::OkStatus();
-}
-
-herr_t AddName(hid_t /*group*/, const char* name, const H5L_info_t* /*info*/, void* names) {
-  static_cast<std::vector<std::string>*>(names)->emplace_back(name);
-  return 0;
+  return regular;
 }
 
 // A cache that holds all chunks under one row, twice, so that no chunk is decompressed for each stretch anew.
@@ -47,6 +45,41 @@ Hdf5Id AccessWithCache(hid_t array, int rank, const hsize_t* extent) {
   if (rank == 2 && chunk[1] > 0) bytes *= (extent[1] + chunk[1] - 1) / chunk[1];
   H5Pset_chunk_cache(access.get(), kCacheSlots, std::clamp(2 * bytes, kDefaultCacheBytes, kMaxCacheBytes), 1);
   return access;
+}
+
+std::string KindName(hid_t type) {
+  switch (H5Tget_class(type)) {
+    case H5T_STRING:
+      return "texts";
+    case H5T_COMPOUND:
+      return "records of several values (a compound type)";
+    case H5T_VLEN:
+      return "rows of different lengths";
+    case H5T_ARRAY:
+      return "arrays within an array";
+    default:
+      return "something else";
+  }
+}
+
+// Bytes of bits are truth values, as PyTables writes them.
+bool IsNumber(hid_t type) {
+  const H5T_class_t kind = H5Tget_class(type);
+  return kind == H5T_FLOAT || kind == H5T_INTEGER || kind == H5T_ENUM ||
+         (kind == H5T_BITFIELD && H5Tget_size(type) == 1);
+}
+
+// What makes an array unfit to be read as [rows] or [rows, width] of numbers; empty where nothing does, and
+// then `extent` is filled.
+std::string FindUnfit(hid_t space, hid_t type, hsize_t extent[2]) {
+  if (!IsNumber(type)) return absl::StrCat("an array of ", KindName(type));
+  if (H5Sget_simple_extent_type(space) == H5S_NULL) return "an empty value";
+  const int rank = H5Sget_simple_extent_ndims(space);
+  if (rank == 0) return "a single value";
+  if (rank != 1 && rank != 2) return absl::StrCat(rank, " dimensions");
+  H5Sget_simple_extent_dims(space, extent, nullptr);
+  const bool fits = extent[1] > 0 && extent[1] <= std::numeric_limits<int>::max() / sizeof(double) / 65536;
+  return fits ? "" : absl::StrCat("a width of ", extent[1]);
 }
 
 }  // namespace
@@ -69,7 +102,13 @@ absl::Status Hdf5Column::Read(std::int64_t first, int count, hid_t memory_type, 
 }
 
 absl::Status Hdf5Column::ReadFloats(std::int64_t first, int count, float* values) const {
-  return Read(first, count, H5T_NATIVE_FLOAT, values);
+  if (!byte_type_.ok() || H5Tget_class(byte_type_.get()) != H5T_BITFIELD)
+    return Read(first, count, H5T_NATIVE_FLOAT, values);
+  // The library has no conversion of bits to numbers.
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(count) * static_cast<std::size_t>(width_));
+  RETURN_IF_ERROR(Read(first, count, byte_type_.get(), bytes.data()));
+  std::copy(bytes.begin(), bytes.end(), values);
+  return absl::OkStatus();
 }
 
 absl::Status Hdf5Column::ReadFlags(std::int64_t first, int count, std::uint8_t* flags) const {
@@ -97,10 +136,7 @@ absl::StatusOr<Hdf5File> Hdf5File::Open(const std::string& path) {
   Hdf5File file;
   file.path_ = path;
   file.file_ = Hdf5Id(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose);
-  if (!file.file_.ok()) {
-    return absl::DataLossError(absl::StrCat(path, ": expected a whole HDF5 file, found a damaged one (",
-                                            Hdf5Reason(), "); copy or record it again"));
-  }
+  if (!file.file_.ok()) return OpenFailure(path);
   return file;
 }
 
@@ -140,12 +176,7 @@ std::optional<std::int64_t> Hdf5File::Number(const std::string& attribute) const
 
 std::vector<std::string> Hdf5File::Keys(const std::string& group) const {
   SilenceHdf5();
-  std::vector<std::string> names;
-  hsize_t at = 0;
-  H5Literate_by_name(file_.get(), group.empty() ? "/" : group.c_str(), H5_INDEX_NAME, H5_ITER_NATIVE, &at,
-                     AddName, &names, H5P_DEFAULT);
-  std::sort(names.begin(), names.end());
-  return names;
+  return GroupKeys(file_.get(), group.empty() ? "/" : group);
 }
 
 bool Hdf5File::Has(const std::string& key) const {
@@ -154,6 +185,12 @@ bool Hdf5File::Has(const std::string& key) const {
   if (slash != std::string::npos && H5Lexists(file_.get(), key.substr(0, slash).c_str(), H5P_DEFAULT) <= 0)
     return false;
   return H5Lexists(file_.get(), key.c_str(), H5P_DEFAULT) > 0;
+}
+
+absl::Status Hdf5File::CheckGroup(const std::string& key) const {
+  SilenceHdf5();
+  const Hdf5Id group(H5Gopen2(file_.get(), key.c_str(), H5P_DEFAULT), H5Gclose);
+  return group.ok() ? absl::OkStatus() : NoGroup(file_.get(), path_, key);
 }
 
 bool Hdf5File::IsArray(const std::string& key) const {
@@ -166,33 +203,26 @@ bool Hdf5File::IsArray(const std::string& key) const {
 
 absl::StatusOr<Hdf5Column> Hdf5File::Column(const std::string& key) const {
   SilenceHdf5();
-  const auto refuse = [&](absl::string_view found) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        path_, ": expected '", key, "' to be an array of numbers, [rows] or [rows, width], found ", found));
-  };
   Hdf5Column column;
   column.path_ = path_;
   column.name_ = key;
   column.array_ = Hdf5Id(H5Dopen2(file_.get(), key.c_str(), H5P_DEFAULT), H5Dclose);
-  if (!column.array_.ok()) return refuse("something that is no array");
+  if (!column.array_.ok()) return NoArray(file_.get(), path_, key);
   const Hdf5Id space(H5Dget_space(column.array_.get()), H5Sclose);
   const Hdf5Id type(H5Dget_type(column.array_.get()), H5Tclose);
-  const H5T_class_t kind = H5Tget_class(type.get());
-  if (kind != H5T_FLOAT && kind != H5T_INTEGER && kind != H5T_ENUM)
-    return refuse("an array of something else");
-  column.rank_ = H5Sget_simple_extent_ndims(space.get());
   hsize_t extent[2] = {0, 1};
-  if (column.rank_ != 1 && column.rank_ != 2) return refuse(absl::StrCat(column.rank_, " dimensions"));
-  H5Sget_simple_extent_dims(space.get(), extent, nullptr);
-  if (extent[1] == 0 || extent[1] > std::numeric_limits<int>::max() / sizeof(double) / 65536) {
-    return refuse(absl::StrCat("a width of ", extent[1]));
+  if (const std::string found = FindUnfit(space.get(), type.get(), extent); !found.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        path_, ": expected '", key, "' to be an array of numbers, [rows] or [rows, width], found ", found));
   }
+  column.rank_ = H5Sget_simple_extent_ndims(space.get());
   column.rows_ = static_cast<std::int64_t>(extent[0]);
   column.width_ = static_cast<int>(extent[1]);
+  if (column.rows_ > 0) RETURN_IF_ERROR(CheckStorage(column.array_.get(), path_, key));
   const Hdf5Id access = AccessWithCache(column.array_.get(), column.rank_, extent);
   column.array_ = Hdf5Id(H5Dopen2(file_.get(), key.c_str(), access.get()), H5Dclose);
-  if (!column.array_.ok()) return refuse(Hdf5Reason());
-  if (kind != H5T_FLOAT && H5Tget_size(type.get()) == 1)
+  if (!column.array_.ok()) return NoArray(file_.get(), path_, key);
+  if (H5Tget_class(type.get()) != H5T_FLOAT && H5Tget_size(type.get()) == 1)
     column.byte_type_ = Hdf5Id(H5Tcopy(type.get()), H5Tclose);
   return column;
 }

@@ -42,7 +42,9 @@ class Hdf5Column {
 // A file open for reading. One thread at a time.
 class Hdf5File {
  public:
-  // NotFound, PermissionDenied, DataLoss (no HDF5 file, or a truncated one), with the path.
+  // NotFound, PermissionDenied, InvalidArgument (no regular file), DataLoss (no HDF5 file, or a truncated
+  // one), FailedPrecondition (open for writing elsewhere, or of a newer HDF5), with the path. Never waits for
+  // another program.
   static absl::StatusOr<Hdf5File> Open(const std::string& path);
 
   const std::string& path() const { return path_; }
@@ -55,10 +57,13 @@ class Hdf5File {
   std::vector<std::string> Keys(const std::string& group = "") const;
   // Whether "key" or "group/key" is there.
   bool Has(const std::string& key) const;
+  // InvalidArgument where `key` is no group, for example a link whose target is missing, saying so.
+  absl::Status CheckGroup(const std::string& key) const;
   // Whether `key` leads to an array of one dimension or more.
   bool IsArray(const std::string& key) const;
 
-  // InvalidArgument where `key` is no array [rows] or [rows, width] of numbers.
+  // InvalidArgument where `key` is no array [rows] or [rows, width] of numbers, or not all of its values are
+  // there; FailedPrecondition where this HDF5 cannot read it (a missing filter, a newer format).
   absl::StatusOr<Hdf5Column> Column(const std::string& key) const;
 
  private:

@@ -5,6 +5,7 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace dbr {
 
@@ -38,6 +39,9 @@ class Hdf5Id {
 
 // Keeps the library from printing this thread's errors to stderr. Call it before anything else.
 void SilenceHdf5();
+
+// The names in a group of a file, sorted; none where it is no group.
+std::vector<std::string> GroupKeys(hid_t file, const std::string& group);
 
 // The innermost reason for which this thread's last failed call failed.
 std::string Hdf5Reason();
