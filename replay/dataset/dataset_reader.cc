@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/types/span.h"
 #include "core/status_macros.h"
 #include "replay/dataset/hdf5_file.h"
+#include "replay/dataset/minari_metadata.h"
 #include "replay/dataset/step_source.h"
 
 namespace dbr {
@@ -23,24 +25,32 @@ struct OpenEpisode {
   bool gap = true;       // the step before the next one was not handed out
 };
 
-absl::StatusOr<DatasetLayout> LayoutOf(const Hdf5File& file, const DatasetOptions& options) {
+// The layout that the file names: by an attribute, or as Minari's own.
+absl::StatusOr<std::optional<DatasetLayout>> OwnLayout(const Hdf5File& file, const MinariMetadata& metadata) {
   const std::optional<std::string> attribute = file.Text("layout");
-  if (!attribute.has_value() && !options.layout.has_value()) {
+  if (!attribute.has_value()) {
+    return metadata.is_minari ? std::make_optional(DatasetLayout::kMinari) : std::nullopt;
+  }
+  const absl::StatusOr<DatasetLayout> own = ParseDatasetLayout(*attribute);
+  if (own.ok()) return *own;
+  return absl::InvalidArgumentError(
+      absl::StrCat(file.path(), ": attribute 'layout': ", own.status().message()));
+}
+
+absl::StatusOr<DatasetLayout> LayoutOf(const Hdf5File& file, const MinariMetadata& metadata,
+                                       const DatasetOptions& options) {
+  ASSIGN_OR_RETURN(const std::optional<DatasetLayout> own, OwnLayout(file, metadata));
+  if (!own.has_value() && !options.layout.has_value()) {
     return absl::InvalidArgumentError(absl::StrCat(
         file.path(), ": expected a named layout, found no attribute 'layout' in the file; name it: ",
         "d4rl, d4rl_pybullet or minari (the first two have the same keys and differ by one row, so "
         "that a guess could train on rewards of other actions)"));
   }
-  if (!attribute.has_value()) return *options.layout;
-  const absl::StatusOr<DatasetLayout> own = ParseDatasetLayout(*attribute);
-  if (!own.ok()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(file.path(), ": attribute 'layout': ", own.status().message()));
-  }
+  if (!own.has_value()) return *options.layout;
   if (options.layout.has_value() && *options.layout != *own) {
     return absl::InvalidArgumentError(absl::StrCat(
         file.path(), ": expected layout ", DatasetLayoutName(*options.layout),
-        ", as named, found attribute 'layout' ", "that says ", *attribute, "; name that one, or none"));
+        ", as named, found a file that says ", DatasetLayoutName(*own), "; name that one, or none"));
   }
   return *own;
 }
@@ -79,6 +89,7 @@ struct DatasetReader::State {
   std::string env;
   TransitionLayout layout;
   std::unique_ptr<StepSource> source;
+  std::string action_space;  // that the file names; empty: none
 
   absl::Span<const Step> steps;  // read
   std::size_t next = 0;          // of them to be handed out
@@ -89,8 +100,12 @@ struct DatasetReader::State {
   absl::Status failure;
 
   StepSourceOptions SourceOptions(bool flags_only) const {
-    return {.max_episode_steps = options.max_episode_steps, .flags_only = flags_only};
+    return {.max_episode_steps = options.max_episode_steps,
+            .flags_only = flags_only,
+            .action_space = action_space,
+            .cancelled = options.cancelled};
   }
+  absl::StatusOr<absl::Span<const Step>> NextSteps(StepSource* from) const;
   absl::Status Refill();
   void TakeFaults();
   absl::Status RefuseBadRows();
@@ -101,8 +116,14 @@ struct DatasetReader::State {
   void CountEnd(bool terminal);
 };
 
+absl::StatusOr<absl::Span<const Step>> DatasetReader::State::NextSteps(StepSource* from) const {
+  if (options.cancelled != nullptr && *options.cancelled)
+    return absl::CancelledError(absl::StrCat(file.path(), ": the reading was stopped"));
+  return from->NextSteps();
+}
+
 absl::Status DatasetReader::State::Refill() {
-  ASSIGN_OR_RETURN(steps, source->NextSteps());
+  ASSIGN_OR_RETURN(steps, NextSteps(source.get()));
   next = 0;
   TakeFaults();
   if (facts.bad_rows > 0 && !options.skip_bad_rows) return RefuseBadRows();
@@ -111,7 +132,7 @@ absl::Status DatasetReader::State::Refill() {
 
 absl::Status DatasetReader::State::RefuseBadRows() {
   while (!steps.empty()) {
-    ASSIGN_OR_RETURN(steps, source->NextSteps());
+    ASSIGN_OR_RETURN(steps, NextSteps(source.get()));
   }
   TakeFaults();
   const RowFaults faults = source->faults();
@@ -201,13 +222,17 @@ void DatasetReader::State::CountEnd(bool terminal) {
 absl::StatusOr<std::unique_ptr<DatasetReader>> DatasetReader::Open(const std::string& path,
                                                                    const DatasetOptions& options) {
   auto state = std::make_unique<State>();
-  ASSIGN_OR_RETURN(state->file, Hdf5File::Open(path));
+  ASSIGN_OR_RETURN(const std::string file, FindDataFile(path));
+  ASSIGN_OR_RETURN(state->file, Hdf5File::Open(file));
   state->options = options;
-  ASSIGN_OR_RETURN(state->options.layout, LayoutOf(state->file, options));
+  ASSIGN_OR_RETURN(MinariMetadata metadata, ReadMinariMetadata(state->file));
+  ASSIGN_OR_RETURN(state->options.layout, LayoutOf(state->file, metadata, options));
+  state->action_space = std::move(metadata.action_space);
   state->env = state->file.Text("env").value_or("");
   if (options.max_episode_steps == 0) {
     const std::int64_t steps = state->file.Number("max_episode_steps").value_or(0);
-    state->options.max_episode_steps = steps > 0 ? static_cast<int>(steps) : kDefaultMaxEpisodeSteps;
+    const bool said = steps > 0 && steps <= std::numeric_limits<int>::max();
+    state->options.max_episode_steps = said ? static_cast<int>(steps) : kDefaultMaxEpisodeSteps;
   }
   ASSIGN_OR_RETURN(state->source, OpenSteps(state->file, *state->options.layout,
                                             state->SourceOptions(/*flags_only=*/false)));
@@ -226,6 +251,9 @@ DatasetLayout DatasetReader::layout() const {
 }
 const TransitionLayout& DatasetReader::transition_layout() const {
   return state_->layout;
+}
+const std::string& DatasetReader::path() const {
+  return state_->file.path();
 }
 const std::string& DatasetReader::env() const {
   return state_->env;
@@ -253,7 +281,7 @@ absl::StatusOr<std::int64_t> DatasetReader::CountTransitions() {
                    OpenSteps(state_->file, layout(), state_->SourceOptions(/*flags_only=*/true)));
   std::int64_t transitions = 0;
   while (true) {
-    ASSIGN_OR_RETURN(const absl::Span<const Step> steps, source->NextSteps());
+    ASSIGN_OR_RETURN(const absl::Span<const Step> steps, state_->NextSteps(source.get()));
     if (steps.empty()) return transitions;
     for (const Step& step : steps) transitions += step.has_next;
   }

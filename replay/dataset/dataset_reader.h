@@ -1,6 +1,7 @@
 // Reads offline data from HDF5 files of any size, as transitions.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -28,6 +29,9 @@ struct DatasetOptions {
   // flag that is neither 0 nor 1 (no episode ends there). Without it such a file is refused as soon as a bad
   // row is met.
   bool skip_bad_rows = false;
+  // Open, Next and CountTransitions return Cancelled soon after this becomes true: before they read the next
+  // few thousand rows or the next episode. Outlives the reader; null: never.
+  const std::atomic<bool>* cancelled = nullptr;
 };
 
 // A stream of a file's transitions in the file's order. What has no next observation has no transition: in
@@ -36,9 +40,12 @@ struct DatasetOptions {
 // on several threads.
 class DatasetReader {
  public:
-  // Opens and checks keys, shapes and sizes; reads no rows. Errors name the file: NotFound, PermissionDenied,
-  // DataLoss (no HDF5 file, or a truncated one), InvalidArgument (no layout named, one that contradicts the
-  // file's attribute, a missing key, arrays of different lengths, sizes of another robot).
+  // Opens and checks keys, shapes and sizes; reads no rows. `path` is an HDF5 file or the folder of a Minari
+  // dataset. Errors name the file: NotFound, PermissionDenied, DataLoss (no HDF5 file, or a truncated one),
+  // InvalidArgument (no regular file, no layout named, one that contradicts the file's own word, a missing
+  // key or one that tells of ends in another way, arrays of different lengths, sizes of another robot),
+  // FailedPrecondition (open for writing elsewhere, a missing filter, a newer HDF5), Cancelled. O(episodes)
+  // in layout minari.
   static absl::StatusOr<std::unique_ptr<DatasetReader>> Open(const std::string& path,
                                                              const DatasetOptions& options);
   ~DatasetReader();
@@ -48,6 +55,8 @@ class DatasetReader {
   DatasetLayout layout() const;
   // Sizes as the file has them; mask_width is 0.
   const TransitionLayout& transition_layout() const;
+  // The HDF5 file that is read.
+  const std::string& path() const;
   // The file's attribute `env`; empty where it has none.
   const std::string& env() const;
   int max_episode_steps() const;

@@ -1,6 +1,7 @@
 // Layout minari: groups episode_0, episode_1, ... with observations [T + 1], actions, rewards, terminations
 // and truncations [T].
 #include <algorithm>
+#include <compare>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,6 +14,7 @@
 #include "absl/strings/string_view.h"
 #include "absl/strings/strip.h"
 #include "core/status_macros.h"
+#include "replay/dataset/action_scale.h"
 #include "replay/dataset/end_keys.h"
 #include "replay/dataset/row_window.h"
 #include "replay/dataset/step_source.h"
@@ -29,9 +31,13 @@ struct EpisodeColumns {
   std::int64_t steps() const { return rewards.rows(); }
 };
 
-std::string GroupName(std::int64_t episode) {
-  return absl::StrCat(kPrefix, episode);
-}
+// A group that holds an episode. Its name may have zeros before the number.
+struct EpisodeGroup {
+  std::int64_t number = 0;
+  std::string name;
+
+  auto operator<=>(const EpisodeGroup&) const = default;
+};
 
 absl::Status CheckKeys(const Hdf5File& file, const std::string& group) {
   RETURN_IF_ERROR(CheckEndKeys(file, group, {"terminations", "truncations"}));
@@ -40,6 +46,7 @@ absl::Status CheckKeys(const Hdf5File& file, const std::string& group) {
     if (!file.Has(absl::StrCat(group, "/", array))) missing.push_back(absl::StrCat("'", array, "'"));
   }
   if (missing.empty()) return absl::OkStatus();
+  if (missing.size() == std::size(kArrays)) RETURN_IF_ERROR(file.CheckGroup(group));
   return absl::InvalidArgumentError(absl::StrCat(file.path(), ": expected group '", group, "' to have ",
                                                  absl::StrJoin(kArrays, ", "), ", found no ",
                                                  absl::StrJoin(missing, ", ")));
@@ -68,19 +75,22 @@ absl::StatusOr<EpisodeColumns> OpenEpisode(const Hdf5File& file, const std::stri
 
 class MinariSteps : public StepSource {
  public:
-  MinariSteps(const Hdf5File& file, bool flags_only, std::vector<std::int64_t> episodes)
+  MinariSteps(const Hdf5File& file, bool flags_only, std::vector<EpisodeGroup> episodes)
       : file_(file), flags_only_(flags_only), episodes_(std::move(episodes)) {}
 
-  absl::Status CountRows() {
-    for (const std::int64_t episode : episodes_) {
-      RETURN_IF_ERROR(CheckKeys(file_, GroupName(episode)));
-      ASSIGN_OR_RETURN(const Hdf5Column rewards, file_.Column(absl::StrCat(GroupName(episode), "/rewards")));
+  absl::Status Open(const StepSourceOptions& options) {
+    for (const EpisodeGroup& episode : episodes_) {
+      RETURN_IF_ERROR(options.CheckGoesOn());
+      RETURN_IF_ERROR(CheckKeys(file_, episode.name));
+      ASSIGN_OR_RETURN(const Hdf5Column rewards, file_.Column(absl::StrCat(episode.name, "/rewards")));
       rows_ += rewards.rows();
     }
-    if (episodes_.empty()) return absl::OkStatus();
-    ASSIGN_OR_RETURN(const EpisodeColumns first, OpenEpisode(file_, GroupName(episodes_[0])));
+    ASSIGN_OR_RETURN(const EpisodeColumns first, OpenEpisode(file_, episodes_[0].name));
     observation_size_ = first.observations.width();
     action_width_ = first.actions.width();
+    if (options.action_space.empty()) return absl::OkStatus();
+    ASSIGN_OR_RETURN(action_scale_,
+                     ActionScale::FromSpace(options.action_space, action_width_, file_.path()));
     return absl::OkStatus();
   }
 
@@ -95,7 +105,7 @@ class MinariSteps : public StepSource {
       if (columns_.has_value() && next_step_ == columns_->steps()) columns_.reset();
       if (!columns_.has_value()) {
         if (next_episode_ == episodes_.size()) break;
-        RETURN_IF_ERROR(Enter(GroupName(episodes_[next_episode_++])));
+        RETURN_IF_ERROR(Enter(episodes_[next_episode_++].name));
       }
       const int count =
           static_cast<int>(std::min<std::int64_t>(columns_->steps() - next_step_, RowWindow::kStretch));
@@ -128,6 +138,7 @@ class MinariSteps : public StepSource {
     if (!flags_only_) {
       RETURN_IF_ERROR(ReadFloats(columns_->observations, count + 1, &observations_));
       RETURN_IF_ERROR(ReadFloats(columns_->actions, count, &actions_));
+      action_scale_.Apply(absl::MakeSpan(actions_));
       RETURN_IF_ERROR(ReadFloats(columns_->rewards, count, &rewards_));
     }
     const bool last = next_step_ + count == columns_->steps();
@@ -169,10 +180,11 @@ class MinariSteps : public StepSource {
 
   const Hdf5File& file_;
   const bool flags_only_;
-  const std::vector<std::int64_t> episodes_;  // numbers, rising
+  const std::vector<EpisodeGroup> episodes_;  // by rising number; at least one
   std::int64_t rows_ = 0;
   int observation_size_ = 0;
   int action_width_ = 0;
+  ActionScale action_scale_;
 
   std::optional<EpisodeColumns> columns_;  // of the episode being read
   std::size_t next_episode_ = 0;           // index in episodes_
@@ -184,26 +196,37 @@ class MinariSteps : public StepSource {
   RowFaults faults_;
 };
 
+// The groups of episodes, by rising number. InvalidArgument for a name that ends in something else, for it
+// would be passed over.
+absl::StatusOr<std::vector<EpisodeGroup>> FindEpisodes(const Hdf5File& file) {
+  std::vector<EpisodeGroup> episodes;
+  for (const std::string& key : file.Keys()) {
+    absl::string_view number = key;
+    if (!absl::ConsumePrefix(&number, kPrefix)) continue;
+    EpisodeGroup episode{.name = key};
+    if (!absl::SimpleAtoi(number, &episode.number)) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          file.path(), ": expected the number of an episode behind episode_, found '", key, "'; rename it"));
+    }
+    episodes.push_back(std::move(episode));
+  }
+  std::sort(episodes.begin(), episodes.end());
+  return episodes;
+}
+
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<StepSource>> OpenMinariSteps(const Hdf5File& file,
                                                             const StepSourceOptions& options) {
-  std::vector<std::int64_t> episodes;
-  for (const std::string& key : file.Keys()) {
-    absl::string_view number = key;
-    std::int64_t episode = 0;
-    if (absl::ConsumePrefix(&number, kPrefix) && absl::SimpleAtoi(number, &episode))
-      episodes.push_back(episode);
-  }
+  ASSIGN_OR_RETURN(std::vector<EpisodeGroup> episodes, FindEpisodes(file));
   if (episodes.empty()) {
     return absl::InvalidArgumentError(
         absl::StrCat(file.path(), ": expected groups episode_0, episode_1, ..., found ",
                      file.Keys().empty() ? "nothing" : absl::StrJoin(file.Keys(), ", "),
                      "; is the file of another layout?"));
   }
-  std::sort(episodes.begin(), episodes.end());
   auto steps = std::make_unique<MinariSteps>(file, options.flags_only, std::move(episodes));
-  RETURN_IF_ERROR(steps->CountRows());
+  RETURN_IF_ERROR(steps->Open(options));
   return steps;
 }
 

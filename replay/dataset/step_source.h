@@ -2,9 +2,12 @@
 // layouts.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
+#include <string>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/types/span.h"
 #include "replay/dataset/hdf5_file.h"
@@ -33,6 +36,14 @@ struct Step {
 struct StepSourceOptions {
   int max_episode_steps = 0;  // longer episodes are cut; as DatasetOptions
   bool flags_only = false;    // reads neither observations nor actions nor rewards
+  // minari: the space of the file's actions, as ActionScale::FromSpace takes it; empty: [-1, 1].
+  std::string action_space = "";
+  const std::atomic<bool>* cancelled = nullptr;  // as DatasetOptions
+
+  absl::Status CheckGoesOn() const {
+    if (cancelled == nullptr || !*cancelled) return absl::OkStatus();
+    return absl::CancelledError("the reading was stopped");
+  }
 };
 
 // A stream of a file's steps in its order. Thread-compatible.
