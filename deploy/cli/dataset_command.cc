@@ -46,8 +46,10 @@ absl::StatusOr<int> RunInfo(const InfoFlags& flags) {
 absl::Status Convert(const ConvertFlags& flags, const Interrupt& interrupt) {
   ASSIGN_OR_RETURN(const std::optional<DatasetLayout> from, ParseLayoutOption("--layout", flags.from));
   ASSIGN_OR_RETURN(const std::optional<DatasetLayout> to, ParseLayoutOption("--to", flags.to));
-  ASSIGN_OR_RETURN(const std::unique_ptr<DatasetReader> reader,
-                   DatasetReader::Open(flags.in, {.layout = from, .skip_bad_rows = flags.skip_bad_rows}));
+  ASSIGN_OR_RETURN(
+      const std::unique_ptr<DatasetReader> reader,
+      DatasetReader::Open(
+          flags.in, {.layout = from, .skip_bad_rows = flags.skip_bad_rows, .cancelled = &interrupt.flag()}));
   DatasetWriterOptions options{.layout = *to, .env = {}};
   options.env.name = reader->env();
   options.env.observation_size = reader->transition_layout().observation_width;
@@ -71,8 +73,10 @@ absl::StatusOr<int> RunConvert(const ConvertFlags& flags) {
   const absl::Status converted = Convert(flags, interrupt);
   if (absl::IsCancelled(converted)) return kInterruptedExit;
   RETURN_IF_ERROR(converted);
-  ASSIGN_OR_RETURN(const DatasetReport report, ReportDataset(flags.out, std::nullopt, interrupt));
-  std::printf("%s", DatasetText(report).c_str());
+  const absl::StatusOr<DatasetReport> report = ReportDataset(flags.out, std::nullopt, interrupt);
+  if (absl::IsCancelled(report.status())) return kInterruptedExit;
+  RETURN_IF_ERROR(report.status());
+  std::printf("%s", DatasetText(*report).c_str());
   return 0;
 }
 
@@ -135,16 +139,16 @@ absl::StatusOr<std::optional<DatasetLayout>> ParseLayoutOption(const std::string
 
 absl::StatusOr<DatasetReport> ReportDataset(const std::string& path, std::optional<DatasetLayout> layout,
                                             const Interrupt& interrupt) {
-  ASSIGN_OR_RETURN(const std::unique_ptr<DatasetReader> reader,
-                   DatasetReader::Open(path, {.layout = layout, .skip_bad_rows = true}));
+  ASSIGN_OR_RETURN(
+      const std::unique_ptr<DatasetReader> reader,
+      DatasetReader::Open(path, {.layout = layout, .skip_bad_rows = true, .cancelled = &interrupt.flag()}));
   TransitionChunk chunk(reader->transition_layout(), kChunk);
   while (true) {
     ASSIGN_OR_RETURN(const int size, reader->Next(&chunk));
     if (size == 0) break;
-    if (interrupt.flag()) return absl::CancelledError("the reading was stopped");
   }
   return DatasetReport{
-      .path = path, .env = reader->env(), .layout = reader->layout(), .facts = reader->facts()};
+      .path = reader->path(), .env = reader->env(), .layout = reader->layout(), .facts = reader->facts()};
 }
 
 void AddDataset(CLI::App* app, int* exit_code) {

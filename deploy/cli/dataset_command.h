@@ -26,9 +26,9 @@ void AddDatasetRecord(CLI::App* dataset, int* exit_code);
 absl::StatusOr<std::optional<DatasetLayout>> ParseLayoutOption(const std::string& option,
                                                                const std::string& name);
 
-// Reads the whole file and reports on it; bad rows are counted and left out.
-// `layout`: none takes the file's own word. Blocks. Errors: DatasetReader::Open's and Next's, naming the
-// file; Cancelled after the user's interrupt.
+// Reads the whole file (or that of a Minari dataset's folder) and reports on it; bad rows are counted and
+// left out. `layout`: none takes the file's own word. Blocks. Errors: DatasetReader::Open's and Next's,
+// naming the file; Cancelled after the user's interrupt.
 absl::StatusOr<DatasetReport> ReportDataset(const std::string& path, std::optional<DatasetLayout> layout,
                                             const Interrupt& interrupt);
 

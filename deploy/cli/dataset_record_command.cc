@@ -159,10 +159,12 @@ absl::StatusOr<int> RunRecord(const RecordFlags& flags) {
   if (absl::IsCancelled(recorded)) return kInterruptedExit;
   RETURN_IF_ERROR(recorded);
   const double seconds = absl::ToDoubleSeconds(MonotonicNow() - start);
-  ASSIGN_OR_RETURN(const DatasetReport report, ReportDataset(flags.out, std::nullopt, interrupt));
-  std::printf("%s  %s in %s s, %s steps/s\n", DatasetText(report).c_str(), PadRight("recorded", 12).c_str(),
+  const absl::StatusOr<DatasetReport> report = ReportDataset(flags.out, std::nullopt, interrupt);
+  if (absl::IsCancelled(report.status())) return kInterruptedExit;
+  RETURN_IF_ERROR(report.status());
+  std::printf("%s  %s in %s s, %s steps/s\n", DatasetText(*report).c_str(), PadRight("recorded", 12).c_str(),
               Fixed(seconds, 1).c_str(),
-              Compact(static_cast<double>(report.facts.transitions) / seconds).c_str());
+              Compact(static_cast<double>(report->facts.transitions) / seconds).c_str());
   return 0;
 }
 

@@ -1,6 +1,7 @@
 #include "deploy/launch/run_plan.h"
 
 #include <algorithm>
+#include <atomic>
 #include <filesystem>
 #include <thread>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "actor/evaluator.h"
 #include "actor/exploration.h"
 #include "core/file_io.h"
+#include "core/shutdown.h"
 #include "core/status_macros.h"
 #include "deploy/launch/same_run.h"
 #include "deploy/launch/summary_reader.h"
@@ -67,9 +69,11 @@ absl::StatusOr<Config> LoadForLaunch(const LaunchOptions& options) {
   if (!options.seed_layout.empty()) seed_buffer->set_layout(options.seed_layout);
   if (options.skip_bad_rows) seed_buffer->set_skip_bad_rows(true);
   std::error_code error;
-  const std::filesystem::path path = std::filesystem::absolute(seed_buffer->path(), error);
+  std::filesystem::path path = std::filesystem::absolute(seed_buffer->path(), error);
   if (error) return ErrnoStatus(error.value(), "cannot find the working folder for", seed_buffer->path());
-  seed_buffer->set_path(path.lexically_normal().string());
+  path = path.lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();  // a folder named with a slash behind it
+  seed_buffer->set_path(path.string());
   return config;
 }
 
@@ -83,9 +87,17 @@ absl::Status CheckSeedBuffer(const Config& config, const EnvSpec& env) {
         "this records one:\n  dbr dataset record --env ",
         env.name, " --quality medium --steps 1000000 --out ", env.name, "-medium.hdf5"));
   }
-  return CheckSeedBufferFits(SeedBufferOptionsFrom(config),
-                             TransitionLayout::Of(env, NeedsReturns(config.algorithm())),
-                             config.replay().capacity());
+  // Counting the transitions of a large file takes its time, in which Ctrl-C must work.
+  std::atomic<bool> stopped = false;
+  SeedBufferOptions options = SeedBufferOptionsFrom(config);
+  options.cancelled = &stopped;
+  absl::Status fits;
+  {
+    const ShutdownWatcher watcher([&stopped] { stopped = true; });
+    fits = CheckSeedBufferFits(options, TransitionLayout::Of(env, NeedsReturns(config.algorithm())),
+                               config.replay().capacity());
+  }
+  return fits.ok() && stopped ? absl::CancelledError("stopped by a signal") : fits;
 }
 
 // Before hours of training, at whose end alone some of them are met.

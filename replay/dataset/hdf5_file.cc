@@ -31,20 +31,18 @@ absl::Status CheckReadable(const std::string& path) {
   return regular;
 }
 
-// A cache that holds all chunks under one row, twice, so that no chunk is decompressed for each stretch anew.
-Hdf5Id AccessWithCache(hid_t array, int rank, const hsize_t* extent) {
-  Hdf5Id access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
+// How large the cache of an array's chunks should be: it holds all chunks under one row, twice, so that no
+// chunk is decompressed for each stretch anew.
+std::size_t CacheBytes(hid_t array, hid_t type, int rank, const hsize_t* extent) {
   const Hdf5Id creation(H5Dget_create_plist(array), H5Pclose);
   hsize_t chunk[2] = {1, 1};
   if (!creation.ok() || H5Pget_layout(creation.get()) != H5D_CHUNKED ||
       H5Pget_chunk(creation.get(), rank, chunk) != rank) {
-    return access;
+    return kDefaultCacheBytes;
   }
-  const Hdf5Id type(H5Dget_type(array), H5Tclose);
-  std::size_t bytes = chunk[0] * chunk[1] * H5Tget_size(type.get());
+  std::size_t bytes = chunk[0] * chunk[1] * H5Tget_size(type);
   if (rank == 2 && chunk[1] > 0) bytes *= (extent[1] + chunk[1] - 1) / chunk[1];
-  H5Pset_chunk_cache(access.get(), kCacheSlots, std::clamp(2 * bytes, kDefaultCacheBytes, kMaxCacheBytes), 1);
-  return access;
+  return std::clamp(2 * bytes, kDefaultCacheBytes, kMaxCacheBytes);
 }
 
 std::string KindName(hid_t type) {
@@ -219,9 +217,13 @@ absl::StatusOr<Hdf5Column> Hdf5File::Column(const std::string& key) const {
   column.rows_ = static_cast<std::int64_t>(extent[0]);
   column.width_ = static_cast<int>(extent[1]);
   if (column.rows_ > 0) RETURN_IF_ERROR(CheckStorage(column.array_.get(), path_, key));
-  const Hdf5Id access = AccessWithCache(column.array_.get(), column.rank_, extent);
-  column.array_ = Hdf5Id(H5Dopen2(file_.get(), key.c_str(), access.get()), H5Dclose);
-  if (!column.array_.ok()) return NoArray(file_.get(), path_, key);
+  const std::size_t cache = CacheBytes(column.array_.get(), type.get(), column.rank_, extent);
+  if (cache > kDefaultCacheBytes) {  // a size that only opening can set
+    const Hdf5Id access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
+    H5Pset_chunk_cache(access.get(), kCacheSlots, cache, 1);
+    column.array_ = Hdf5Id(H5Dopen2(file_.get(), key.c_str(), access.get()), H5Dclose);
+    if (!column.array_.ok()) return NoArray(file_.get(), path_, key);
+  }
   if (H5Tget_class(type.get()) != H5T_FLOAT && H5Tget_size(type.get()) == 1)
     column.byte_type_ = Hdf5Id(H5Tcopy(type.get()), H5Tclose);
   return column;

@@ -3,8 +3,10 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <atomic>
 #include <filesystem>
 #include <string>
+#include <utility>
 
 #include "absl/synchronization/notification.h"
 #include "core/run_folder.h"
@@ -54,12 +56,20 @@ void LogSeedBuffer(const std::string& path, const SeedBufferRecord& seed_buffer)
 }
 
 absl::Status Serve(const ServiceArguments& arguments, const Config& config) {
-  ASSIGN_OR_RETURN(const ReplayServerOptions options, MakeOptions(arguments, config));
+  ASSIGN_OR_RETURN(ReplayServerOptions options, MakeOptions(arguments, config));
   absl::Notification stop;
-  const ShutdownWatcher watcher([&stop] {
+  std::atomic<bool> stopping = false;
+  const ShutdownWatcher watcher([&] {
+    stopping = true;
     if (!stop.HasBeenNotified()) stop.Notify();
   });
-  ASSIGN_OR_RETURN(const std::unique_ptr<ReplayServer> server, ReplayServer::Start(options));
+  options.seed_buffer.cancelled = &stopping;
+  absl::StatusOr<std::unique_ptr<ReplayServer>> started = ReplayServer::Start(options);
+  if (absl::IsCancelled(started.status())) {
+    spdlog::info("stopped before the seed buffer was whole; --resume goes on with it");
+    return absl::OkStatus();
+  }
+  ASSIGN_OR_RETURN(const std::unique_ptr<ReplayServer> server, std::move(started));
   if (arguments.resume) {
     spdlog::info("resumed {} with {} transitions; {} were incomplete and are dropped", options.store.path,
                  server->recovered(), server->torn());

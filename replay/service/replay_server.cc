@@ -51,9 +51,12 @@ ReplayServer::ReplayServer(std::unique_ptr<PartitionedBuffer> buffer)
 absl::StatusOr<std::unique_ptr<ReplayServer>> ReplayServer::Start(const ReplayServerOptions& options) {
   ASSIGN_OR_RETURN(std::unique_ptr<TransitionStore> store, TransitionStore::Open(options.store));
   auto server = StartWith(options, std::move(store));
-  // A start that fails leaves no empty store behind, which the next start would refuse to overwrite.
-  if (!server.ok() && !options.store.resume && !options.store.path.empty())
+  // A start that fails leaves no empty store behind, which the next start would refuse to overwrite. One that
+  // was stopped can be resumed.
+  if (!server.ok() && !absl::IsCancelled(server.status()) && !options.store.resume &&
+      !options.store.path.empty()) {
     unlink(options.store.path.c_str());
+  }
   return server;
 }
 

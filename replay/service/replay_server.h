@@ -35,7 +35,9 @@ SeedBufferOptions SeedBufferOptionsFrom(const Config& config);
 class ReplayServer {
  public:
   // Opens the store, loads the seed buffer, and then serves. Blocks meanwhile. Errors of
-  // TransitionStore::Open, PartitionedBuffer::Make, ImportSeedBuffer and StartServer.
+  // TransitionStore::Open, PartitionedBuffer::Make, ImportSeedBuffer and StartServer. After
+  // ImportSeedBuffer's Cancelled the store stays, for a later start with `store.resume`; after another error
+  // a new one is removed.
   static absl::StatusOr<std::unique_ptr<ReplayServer>> Start(const ReplayServerOptions& options);
   ~ReplayServer();  // Stop()
   ReplayServer(const ReplayServer&) = delete;

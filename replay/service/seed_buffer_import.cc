@@ -59,7 +59,8 @@ absl::StatusOr<std::unique_ptr<DatasetReader>> OpenFitting(const SeedBufferOptio
                          .observation_size = layout.observation_width,
                          .action_width = layout.action_width,
                          .discount = options.discount,
-                         .skip_bad_rows = options.skip_bad_rows};
+                         .skip_bad_rows = options.skip_bad_rows,
+                         .cancelled = options.cancelled};
   if (!options.layout.empty()) {
     ASSIGN_OR_RETURN(dataset.layout, ParseDatasetLayout(options.layout));
   }

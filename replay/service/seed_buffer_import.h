@@ -1,6 +1,7 @@
 // Loading the seed buffer: offline data from a file, which a replay buffer begins with.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <string>
 
@@ -13,7 +14,7 @@
 namespace dbr {
 
 struct SeedBufferOptions {
-  std::string path;            // HDF5 file; empty: none
+  std::string path;            // HDF5 file, or folder of a Minari dataset; empty: none
   std::string layout;          // of replay/dataset/dataset_layout.h; empty: as the file's own attribute says
   std::string env;             // name of the environment that the data must come from
   float discount = 0.99f;      // of transitions after which the task goes on
@@ -23,6 +24,8 @@ struct SeedBufferOptions {
   // there is nothing but the seed buffer.
   std::uint64_t min_rows = 0;
   bool others_will_come = true;  // then a seed buffer that is never evicted must leave room for others
+  // Both functions below return Cancelled soon after this becomes true. Outlives the call; null: never.
+  const std::atomic<bool>* cancelled = nullptr;
 };
 
 // Checks that the file is data of that environment and fits a buffer of `capacity` rows. Opens it and counts
@@ -35,8 +38,8 @@ absl::Status CheckSeedBufferFits(const SeedBufferOptions& options, const Transit
 // Returns the record of the seed buffer. Where the buffer's rows have a return it is computed here; behind an
 // end that is cut or unfinished, the mean reward of the last min(T, 1 / (1 - discount)) steps is taken to go
 // on for ever (replay/dataset/return_reader.h). Errors: InvalidArgument for a seed buffer that does not fit
-// the capacity or the environment, and all errors of DatasetReader and PartitionedBuffer::InsertSeedBuffer.
-// Blocks: it loads some 10^6 rows a second.
+// the capacity or the environment, Cancelled (what was read stays in the buffer), and all errors of
+// DatasetReader and PartitionedBuffer::InsertSeedBuffer. Blocks: it loads some 10^6 rows a second.
 absl::StatusOr<SeedBufferRecord> ImportSeedBuffer(const SeedBufferOptions& options,
                                                   PartitionedBuffer* buffer);
 

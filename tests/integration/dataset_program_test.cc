@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -109,6 +110,14 @@ TEST_F(DatasetProgramTest, BadUsageIsSaidInOneLineAndLeavesNoFile) {
   EXPECT_THAT(refused({"info", folder_ / "none.hdf5", "--layout", "d4rl"}, 1), HasSubstr("none.hdf5"));
   EXPECT_THAT(refused({"info", out, "--layout", "rlds"}, 2), HasSubstr("d4rl, d4rl_pybullet or minari"));
   EXPECT_EQ(FilesInFolder(), 0);
+}
+
+TEST_F(DatasetProgramTest, ANamedPipeIsRefusedAtOnce) {
+  const std::string pipe = folder_ / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const auto [status, output] = Dataset({"info", pipe, "--layout", "d4rl"});
+  EXPECT_EQ(status, 2);
+  EXPECT_THAT(output, HasSubstr("expected a file, found a pipe"));
 }
 
 TEST_F(DatasetProgramTest, CtrlCStopsARecordingAndLeavesNothing) {

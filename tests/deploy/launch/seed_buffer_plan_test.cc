@@ -67,6 +67,14 @@ class SeedBufferPlanTest : public testing::Test {
   const std::string seed_buffer_ = folder_ / "seed.hdf5";
 };
 
+TEST_F(SeedBufferPlanTest, AFolderNamedWithASlashHasAName) {
+  std::filesystem::create_directories(folder_ / "set/data");
+  WriteSeedBuffer(folder_ / "set/data/main_data.hdf5");  // the file itself says that its layout is d4rl
+  const auto plan = PrepareRun(Options(folder_ / "set/"), kNow);
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  EXPECT_EQ(plan->config.replay().seed_buffer().path(), folder_ / "set");
+}
+
 TEST_F(SeedBufferPlanTest, TheEffectiveConfigNamesTheSeedByItsAbsolutePath) {
   std::filesystem::current_path(folder_.path());
   LaunchOptions options = Options("./seed.hdf5");

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -287,6 +288,18 @@ TEST_F(SeedBufferImportTest, ActionsOutsideTheRangeAreKeptAndCounted) {
   EXPECT_EQ(Stats().seed_buffer_actions_outside(), 1u);
   Start();
   EXPECT_EQ(Stats().seed_buffer_actions_outside(), 1u) << "the store remembers it";
+}
+
+TEST_F(SeedBufferImportTest, AStoppedImportKeepsItsStoreAndCanBeResumed) {
+  std::atomic<bool> cancelled = true;
+  options_.seed_buffer.cancelled = &cancelled;
+  EXPECT_EQ(ReplayServer::Start(options_).status().code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(CheckSeedBufferFits(options_.seed_buffer, kLayout, options_.store.capacity).code(),
+            absl::StatusCode::kCancelled);
+  cancelled = false;
+  options_.store.resume = true;
+  Start();
+  EXPECT_EQ(Stats().seed_buffer_rows(), rows());
 }
 
 TEST_F(SeedBufferImportTest, AMissingFileIsSaid) {
