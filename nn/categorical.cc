@@ -28,8 +28,9 @@ void MaskedSoftmax(const ConstMatrixRef<Scalar>& logits, const ConstMatrixRef<Sc
       p(k, j) = mask[k] > 0 ? std::exp(z[k] - largest) : Scalar{0};
       sum += p(k, j);
     }
-    const Scalar log_sum = sum > 0 ? largest + std::log(sum) : Scalar{0};
-    const Scalar scale = sum > 0 ? 1 / sum : Scalar{0};
+    // The sum is 0 without a legal action alone; it is a NaN where a legal logit is one.
+    const Scalar log_sum = sum != 0 ? largest + std::log(sum) : Scalar{0};
+    const Scalar scale = sum != 0 ? 1 / sum : Scalar{0};
     for (Eigen::Index k = 0; k < actions; ++k) {
       p(k, j) *= scale;
       log_p(k, j) = mask[k] > 0 ? z[k] - log_sum : Scalar{0};

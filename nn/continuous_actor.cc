@@ -2,8 +2,9 @@
 
 #include <cmath>
 
-#include "absl/strings/str_cat.h"
 #include "core/check.h"
+#include "nn/keep_nan.h"
+#include "nn/not_finite.h"
 
 namespace dbr {
 
@@ -18,21 +19,17 @@ absl::Status ContinuousActor::Act(const PolicyNetworks& policy, ActingMode mode,
                                   Eigen::Ref<MatrixX<float>> actions) {
   if (mode == SUPPORT) {
     return absl::InvalidArgumentError(
-        "the mode SUPPORT serves discrete actions alone: use SAMPLE, MODE or "
-        "GREEDY_Q");
+        "the mode SUPPORT serves discrete actions alone: use SAMPLE, MODE or GREEDY_Q");
   }
   Evaluate(policy, observations);
-  if (!head_.mean().allFinite() || !head_.log_std().allFinite()) {
-    return absl::InternalError(absl::StrCat("policy version ", policy.snapshot().version,
-                                            " gives values that are not finite. Use an earlier checkpoint."));
-  }
+  if (!head_.mean().allFinite() || !head_.log_std().allFinite()) return NotFiniteError(policy.snapshot());
   if (mode == MODE) {
     actions = head_.mean().array().tanh().matrix();
   } else if (mode == SAMPLE) {
     Sample(1, rng);
     actions = actions_;
   } else {
-    ChooseGreedy(policy, observations, rng, actions);
+    return ChooseGreedy(policy, observations, rng, actions);
   }
   return absl::OkStatus();
 }
@@ -63,10 +60,12 @@ const MatrixX<float>& ContinuousActor::Critic(const PolicyNetworks& policy, cons
   return MlpForward<float>(policy.critic_shape(), parameters->data(), inputs_, &critic_activations_);
 }
 
-void ContinuousActor::ChooseGreedy(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
-                                   Rng& rng, Eigen::Ref<MatrixX<float>> actions) {
+absl::Status ContinuousActor::ChooseGreedy(const PolicyNetworks& policy,
+                                           const ConstMatrixRef<float>& observations, Rng& rng,
+                                           Eigen::Ref<MatrixX<float>> actions) {
   Sample(kGreedySamples, rng);
   const MatrixX<float>& q = Critic(policy, kCritic1, observations, actions_);
+  if (!q.allFinite()) return NotFiniteError(policy.snapshot());
   const Eigen::Index n = observations.cols();
   for (Eigen::Index j = 0; j < n; ++j) {
     Eigen::Index best = j;
@@ -75,12 +74,13 @@ void ContinuousActor::ChooseGreedy(const PolicyNetworks& policy, const ConstMatr
     }
     actions.col(j) = actions_.col(best);
   }
+  return absl::OkStatus();
 }
 
 void ContinuousActor::EvaluateSmaller(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
                                       const ConstMatrixRef<float>& actions) {
   values_ = Critic(policy, kCritic1, observations, actions).row(0);
-  values_ = values_.cwiseMin(Critic(policy, kCritic2, observations, actions).row(0).transpose());
+  values_ = EachSmallerOrNan(values_, Critic(policy, kCritic2, observations, actions).row(0).transpose());
 }
 
 void ContinuousActor::MeanValue(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,

@@ -41,8 +41,9 @@ class ContinuousActor {
   const MatrixX<float>& Critic(const PolicyNetworks& policy, const char* name,
                                const ConstMatrixRef<float>& observations,
                                const ConstMatrixRef<float>& actions);
-  void ChooseGreedy(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations, Rng& rng,
-                    Eigen::Ref<MatrixX<float>> actions);
+  // Internal where the critic gives a value that is not finite.
+  absl::Status ChooseGreedy(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations, Rng& rng,
+                            Eigen::Ref<MatrixX<float>> actions);
 
   MlpActivations<float> policy_activations_, critic_activations_;
   GaussianHead<float> head_;

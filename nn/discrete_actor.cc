@@ -4,8 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "absl/strings/str_cat.h"
 #include "core/check.h"
+#include "nn/keep_nan.h"
+#include "nn/not_finite.h"
 
 namespace dbr {
 namespace {
@@ -67,7 +68,7 @@ void DiscreteActor::RunCategorical(const PolicyNetworks& policy, const char* nam
 void DiscreteActor::RunCritics(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations) {
   if (policy.has_critics()) {
     view_.q = Run(policy, kCritic1, observations);
-    view_.q = view_.q.cwiseMin(Run(policy, kCritic2, observations));
+    view_.q = EachSmallerOrNan(view_.q, Run(policy, kCritic2, observations));
   } else {
     view_.q.resize(0, 0);
   }
@@ -93,11 +94,12 @@ absl::Status DiscreteActor::Act(const PolicyNetworks& policy, ActingMode mode,
   }
   RunCategorical(policy, kPolicyNetwork, observations, masks, &view_.policy);
   RunCritics(policy, observations);
-  if (mode == SUPPORT) RunDualBehavior(policy, observations, masks);
-  if (!view_.policy.allFinite() || !view_.q.allFinite()) {
-    return absl::InternalError(absl::StrCat("policy version ", policy.snapshot().version,
-                                            " gives values that are not finite. Use an earlier checkpoint."));
+  bool finite = view_.policy.allFinite() && view_.q.allFinite();
+  if (mode == SUPPORT) {
+    RunDualBehavior(policy, observations, masks);
+    finite = finite && view_.beta_plus.allFinite() && view_.beta_minus.allFinite();
   }
+  if (!finite) return NotFiniteError(policy.snapshot());
   for (Eigen::Index j = 0; j < observations.cols(); ++j) {
     switch (mode) {
       case SAMPLE:

@@ -14,7 +14,8 @@ namespace {
 // second-level cache.
 constexpr Eigen::Index kBlockColumns = 256;
 
-// Adds the bias to each of n columns of y [rows x n] and clips at zero where `relu`, in one pass.
+// Adds the bias to each of n columns of y [rows x n] and clips at zero where `relu`, in one pass. A NaN stays
+// one (nn/keep_nan.h).
 template <class Scalar>
 void AddBias(const Scalar* bias, bool relu, Eigen::Map<MatrixX<Scalar>> y) {
   const Eigen::Map<const VectorX<Scalar>> b(bias, y.rows());

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/check.h"
+#include "nn/keep_nan.h"
 
 namespace dbr {
 
@@ -22,11 +23,10 @@ void GreatestTargetValue(const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<
   const Eigen::Index n = value->size();
   DBR_CHECK(n > 0 && q1.cols() % n == 0 && q2.cols() == q1.cols());
   for (Eigen::Index j = 0; j < q1.cols(); ++j) {
-    const Scalar low = std::min(q1(0, j), q2(0, j)), high = std::max(q1(0, j), q2(0, j));
+    const Scalar low = SmallerOrNan(q1(0, j), q2(0, j)), high = GreaterOrNan(q1(0, j), q2(0, j));
     const Scalar each = min_weight * low + (1 - min_weight) * high;
     Scalar& greatest = (*value)[j % n];
-    // std::max would lose a NaN of the critics.
-    if (j < n || !(each <= greatest)) greatest = each;
+    greatest = j < n ? each : GreaterOrNan(greatest, each);
   }
 }
 
@@ -36,7 +36,7 @@ void MeanOfSmaller(const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar
   const Eigen::Index n = value->size();
   DBR_CHECK(n > 0 && q1.cols() % n == 0 && q2.cols() == q1.cols());
   value->setZero();
-  for (Eigen::Index j = 0; j < q1.cols(); ++j) (*value)[j % n] += std::min(q1(0, j), q2(0, j));
+  for (Eigen::Index j = 0; j < q1.cols(); ++j) (*value)[j % n] += SmallerOrNan(q1(0, j), q2(0, j));
   *value /= static_cast<Scalar>(q1.cols() / n);
 }
 
@@ -54,7 +54,7 @@ void SmallerMeanQTerm(const QTermOptions& options, const ConstMatrixRef<Scalar>&
       mean1 += q1(0, k);
       mean2 += q2(0, k);
     }
-    const Scalar smaller = std::min(mean1, mean2) / static_cast<Scalar>(count);
+    const Scalar smaller = SmallerOrNan(mean1, mean2) / static_cast<Scalar>(count);
     sum += smaller;
     size += std::abs(smaller);
     MatrixX<Scalar>& d_q = mean1 <= mean2 ? term->d_q1 : term->d_q2;

@@ -5,6 +5,7 @@
 
 #include "core/check.h"
 #include "nn/divergence.h"
+#include "nn/keep_nan.h"
 
 namespace dbr {
 namespace {
@@ -21,7 +22,7 @@ void AddQTerm(const PolicyLossOptions& options, const ValuedPolicy<Scalar>& at,
     const Scalar value1 = policy.probabilities.col(j).dot(q1.col(j));
     const Scalar value2 = policy.probabilities.col(j).dot(q2.col(j));
     const auto smaller = value1 <= value2 ? q1.col(j) : q2.col(j);
-    sum += std::min(value1, value2);
+    sum += SmallerOrNan(value1, value2);
     size += policy.probabilities.col(j).dot(smaller.cwiseAbs());
     gradient->col(j) -= smaller;
   }
@@ -51,8 +52,9 @@ Scalar AddEntropyTerm(const Categorical<Scalar>& policy, Scalar weight, VectorX<
 template <class Scalar>
 void ExpectedTargetValue(const Categorical<Scalar>& policy, const ConstMatrixRef<Scalar>& q1,
                          const ConstMatrixRef<Scalar>& q2, Scalar min_weight, VectorX<Scalar>* value) {
+  // The greater twin may drop a NaN: the smaller one has it, at any weight.
   *value = (policy.probabilities.array() *
-            (min_weight * q1.array().min(q2.array()) + (1 - min_weight) * q1.array().max(q2.array())))
+            (min_weight * EachSmallerOrNan(q1, q2).array() + (1 - min_weight) * q1.array().max(q2.array())))
                .colwise()
                .sum()
                .transpose();
@@ -64,10 +66,14 @@ void GreedyValue(const ConstMatrixRef<Scalar>& chooser, const ConstMatrixRef<Sca
   value->resize(chooser.cols());
   for (Eigen::Index j = 0; j < chooser.cols(); ++j) {
     Eigen::Index best = -1;
+    Scalar greatest = 0;
     for (Eigen::Index k = 0; k < chooser.rows(); ++k) {
-      if (masks(k, j) > 0 && (best < 0 || chooser(k, j) > chooser(best, j))) best = k;
+      if (masks(k, j) <= 0) continue;
+      greatest = best < 0 ? chooser(k, j) : GreaterOrNan(greatest, chooser(k, j));
+      if (best < 0 || chooser(k, j) > chooser(best, j)) best = k;
     }
-    (*value)[j] = best < 0 ? Scalar{0} : judge(best, j);
+    const Scalar chosen = best < 0 ? Scalar{0} : judge(best, j);
+    (*value)[j] = std::isnan(greatest) ? greatest : chosen;
   }
 }
 
@@ -78,7 +84,8 @@ void ComputeAdvantages(const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Sc
   advantages->resize(static_cast<std::size_t>(q1.cols()));
   for (Eigen::Index j = 0; j < q1.cols(); ++j) {
     const auto a = static_cast<Eigen::Index>(actions(0, j));
-    (*advantages)[static_cast<std::size_t>(j)] = static_cast<float>(std::min(q1(a, j), q2(a, j)) - value[j]);
+    (*advantages)[static_cast<std::size_t>(j)] =
+        static_cast<float>(SmallerOrNan(q1(a, j), q2(a, j)) - value[j]);
   }
 }
 
@@ -168,7 +175,7 @@ SoftPolicyLoss<Scalar> DiscreteSoftPolicyLoss(const Categorical<Scalar>& policy,
                                               VectorX<Scalar>* entropy, MatrixX<Scalar>* d_logits) {
   SoftPolicyLoss<Scalar> result;
   const auto n = static_cast<Scalar>(q1.cols());
-  *d_logits = -q1.cwiseMin(q2) / n;
+  *d_logits = -EachSmallerOrNan(q1, q2) / n;
   result.value = -policy.probabilities.cwiseProduct(*d_logits).sum();
   result.entropy = AddEntropyTerm(policy, temperature, entropy, d_logits);
   result.loss = -result.value - temperature * result.entropy;

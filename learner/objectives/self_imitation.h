@@ -19,7 +19,7 @@ class SelfImitation {
     advantage_ = static_cast<Scalar>(reward_scale) * batch.returns - value;
     weights_ = advantage_.cwiseMax(Scalar{0});
     const Scalar mean = weights_.mean();
-    imitates_ = mean > 0;
+    imitates_ = mean != 0;  // a NaN goes on into the weights
     if (imitates_) weights_ /= mean;
   }
 

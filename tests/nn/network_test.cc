@@ -8,6 +8,7 @@
 #include "core/rng.h"
 #include "nn/adam.h"
 #include "nn/categorical.h"
+#include "nn/gaussian_head.h"
 #include "nn/mlp.h"
 #include "nn/policy.h"
 #include "tests/support/numeric.h"
@@ -109,6 +110,33 @@ TEST_P(MlpDepth, SamplesWithoutAGradientHaveNoneForTheirInput) {
 
 INSTANTIATE_TEST_SUITE_P(Depths, MlpDepth,
                          testing::Values(std::vector<int>{}, std::vector<int>{6}, std::vector<int>{5, 7, 6}));
+
+// A ReLU that took the greater of a NaN and 0 as 0 would make a broken network look sound.
+TEST(Mlp, ANaNOfAHiddenUnitReachesTheOutput) {
+  for (const int width : {1, 3, 8, 13}) {  // with and without whole vector registers
+    const MlpShape shape(2, {width, width}, 1);
+    for (int unit = 0; unit < width; ++unit) {
+      for (const int layer : {0, 1}) {
+        VectorX<float> parameters = VectorX<float>::Constant(shape.parameter_count(), 0.5f);
+        parameters[shape.bias_offset(layer) + unit] = NAN;
+        MlpActivations<float> activations;
+        const MatrixX<float> x = MatrixX<float>::Ones(2, 1);
+        EXPECT_TRUE(std::isnan(MlpForward<float>(shape, parameters.data(), x, &activations)(0, 0)))
+            << "unit " << unit << " of " << width;
+      }
+    }
+  }
+}
+
+TEST(GaussianHeadTest, ANaNIsNotClippedToALimit) {
+  for (const int dimensions : {1, 3, 8, 13}) {
+    MatrixX<float> output = MatrixX<float>::Zero(2 * dimensions, 1);
+    output.bottomRows(dimensions).setConstant(NAN);
+    GaussianHead<float> head;
+    head.Split(output, kPolicyLogStd);
+    EXPECT_TRUE(head.log_std().array().isNaN().all()) << dimensions;
+  }
+}
 
 TEST(Mlp, CountsUsefulOperationsOfEachProductOnce) {
   const MlpShape shape(84, {256, 256, 256}, 7);
@@ -222,6 +250,19 @@ TEST(MaskedCategorical, AColumnWithoutLegalActionsIsZero) {
   MaskedSoftmax<double>(Matrix::Ones(3, 1), Matrix::Zero(3, 1), &p);
   EXPECT_TRUE(p.probabilities.isZero(0));
   EXPECT_TRUE(p.log_probabilities.isZero(0));
+}
+
+TEST(MaskedCategorical, ANaNReachesEveryLegalActionOfItsColumn) {
+  MatrixX<float> logits = MatrixX<float>::Zero(3, 2), masks = MatrixX<float>::Ones(3, 2);
+  logits(1, 0) = NAN;
+  masks(2, 0) = 0;
+  Categorical<float> p;
+  MaskedSoftmax<float>(logits, masks, &p);
+  for (const int action : {0, 1}) {
+    EXPECT_TRUE(std::isnan(p.probabilities(action, 0))) << action;
+    EXPECT_TRUE(std::isnan(p.log_probabilities(action, 0))) << action;
+  }
+  EXPECT_TRUE(p.probabilities.col(1).allFinite());
 }
 
 TEST(MaskedCategorical, StaysFiniteForLargeLogits) {
@@ -342,9 +383,74 @@ TEST_F(Acting, ANetworkOfAnotherSizeIsRefusedByName) {
 }
 
 TEST_F(Acting, ValuesThatAreNotFiniteAreAnError) {
-  snapshot_.networks[1].second.back() = NAN;
-  Act(GREEDY_Q, {1, 1, 1, 1});
-  EXPECT_TRUE(absl::IsInternal(status_)) << status_;
+  const PolicySnapshot sound = snapshot_;
+  for (std::size_t network = 0; network < sound.networks.size(); ++network) {
+    snapshot_ = sound;
+    snapshot_.networks[network].second.back() = NAN;
+    Act(SUPPORT, {1, 1, 1, 1});  // it needs them all
+    EXPECT_TRUE(absl::IsInternal(status_)) << sound.networks[network].first << ": " << status_;
+  }
+}
+
+TEST_F(Acting, ACriticThatIsNotFiniteJudgesNothing) {
+  const PolicySnapshot sound = snapshot_;
+  for (const std::size_t critic : {1, 2}) {
+    snapshot_ = sound;
+    snapshot_.networks[critic].second.back() = NAN;
+    VectorX<float> values(1);
+    runner_.Values(**PolicyNetworks::Create(snapshot_), MatrixX<float>::Zero(1, 1),
+                   MatrixX<float>::Ones(4, 1), rng_, values);
+    EXPECT_TRUE(std::isnan(values[0])) << "critic " << critic;
+  }
+}
+
+// A policy over one continuous action without hidden layers.
+PolicySnapshot OneDimension() {
+  PolicySnapshot snapshot;
+  snapshot.version = 1;
+  snapshot.spec = {.env = "test",
+                   .algorithm = "sac",
+                   .observation_size = 1,
+                   .actions = {ActionKind::kContinuous, 1},
+                   .hidden_sizes = {}};
+  snapshot.networks = {{kPolicyNetwork, Constant({0, 0})},
+                       {kCritic1, {0.0f, 1.0f, 0.0f}},  // weights of the observation and the action, bias
+                       {kCritic2, {0.0f, 1.0f, 0.0f}}};
+  return snapshot;
+}
+
+TEST(ContinuousActing, ByQAValueThatIsNotFiniteIsAnError) {
+  PolicySnapshot snapshot = OneDimension();
+  PolicyRunner runner;
+  Rng rng(1);
+  const MatrixX<float> observations = MatrixX<float>::Zero(1, 2), masks(0, 2);
+  MatrixX<float> actions(1, 2);
+  ASSERT_TRUE(
+      runner.Act(**PolicyNetworks::Create(snapshot), GREEDY_Q, observations, masks, rng, actions).ok());
+  snapshot.networks[1].second.back() = NAN;
+  const absl::Status status =
+      runner.Act(**PolicyNetworks::Create(snapshot), GREEDY_Q, observations, masks, rng, actions);
+  EXPECT_TRUE(absl::IsInternal(status)) << status;
+  EXPECT_TRUE(runner.Act(**PolicyNetworks::Create(snapshot), MODE, observations, masks, rng, actions).ok())
+      << "by the policy alone no critic is asked";
+}
+
+TEST(ContinuousActing, ACriticThatIsNotFiniteJudgesNothing) {
+  for (const std::size_t critic : {1, 2}) {
+    PolicySnapshot snapshot = OneDimension();
+    snapshot.networks[critic].second.back() = NAN;
+    const auto policy = PolicyNetworks::Create(snapshot);
+    PolicyRunner runner;
+    Rng rng(1);
+    const MatrixX<float> observations = MatrixX<float>::Zero(1, 1), masks(0, 1);
+    MatrixX<float> actions(1, 1);
+    ASSERT_TRUE(runner.Act(**policy, MODE, observations, masks, rng, actions).ok());
+    VectorX<float> advantages(1), values(1);
+    runner.Advantages(actions, rng, advantages);
+    EXPECT_TRUE(std::isnan(advantages[0])) << "critic " << critic;
+    runner.Values(**policy, observations, masks, rng, values);
+    EXPECT_TRUE(std::isnan(values[0])) << "critic " << critic;
+  }
 }
 
 }  // namespace

@@ -213,6 +213,32 @@ TEST_P(Conformance, ALossThatIsNotFiniteIsNamed) {
   EXPECT_THAT(std::string(status.message()), testing::HasSubstr("critic_loss"));
 }
 
+// One NaN anywhere in the state (a network, a target, a moment of Adam, the multiplier) reaches the figures
+// of one of the next updates: nothing on the way takes the other, finite side.
+TEST_P(Conformance, ANaNInTheStateEndsTraining) {
+  constexpr int kEnough = 4;  // TD3's policy moves in every second update
+  Update(algorithm_.get());
+  const TensorFile sound = StateOf(*algorithm_);
+  const bool multiplied = GetParam().variant != "Mrl" && GetParam().id.name != "brac";  // else it is constant
+  for (const auto& [name, values] : sound.tensors) {
+    if (absl::StartsWith(name, "log_alpha") && !multiplied) continue;
+    // The end of a policy may be the bias of a log-std that nothing reads.
+    const std::size_t last = absl::StartsWith(name, "critic") ? values.size() - 1 : 0;
+    for (const std::size_t place : {std::size_t{0}, last}) {
+      TensorFile damaged = sound;
+      damaged.tensors[name][place] = NAN;
+      const auto algorithm = Make(1);
+      ASSERT_TRUE(algorithm->Load(damaged).ok());
+      absl::Status status;
+      for (int i = 0; i < kEnough && status.ok(); ++i) {
+        const Batch uniform = Random(16), plus = Random(16), minus = Random(16);
+        status = algorithm->Update({uniform, plus, minus});
+      }
+      EXPECT_TRUE(absl::IsInternal(status)) << name << " at " << place << " of " << values.size();
+    }
+  }
+}
+
 TEST_P(Conformance, TwoThreadsGiveWhatOneGives) {
   TensorFile states[2];
   for (const int threads : {1, 2}) {

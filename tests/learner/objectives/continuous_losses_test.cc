@@ -43,13 +43,47 @@ TEST(GreatestTargetValueTest, TakesTheGreatestOfEachStatesDraws) {
   EXPECT_DOUBLE_EQ(value[1], 0.75 * 1 + 0.25 * 5);
 }
 
-TEST(GreatestTargetValueTest, DoesNotLoseANaN) {
-  Matrix q(1, 2);
-  q << 1, NAN;
+// Three draws of one state; a NaN is in one draw of one critic.
+class NaNOfACriticsDraw : public testing::TestWithParam<std::tuple<int, int>> {
+ protected:
+  NaNOfACriticsDraw() {
+    const auto [critic, draw] = GetParam();
+    q1_ << 1, 3, 2;
+    q2_ << 2, 1, 4;
+    (critic == 1 ? q1_ : q2_)(0, draw) = NAN;
+  }
+
+  Matrix q1_{1, 3}, q2_{1, 3};
+};
+
+TEST_P(NaNOfACriticsDraw, ReachesTheTargetValue) {
+  for (const double min_weight : {0.0, 0.75, 1.0}) {
+    Vector value(1);
+    GreatestTargetValue<double>(q1_, q2_, min_weight, &value);
+    EXPECT_TRUE(std::isnan(value[0])) << min_weight;
+  }
+}
+
+TEST_P(NaNOfACriticsDraw, ReachesTheMeanOfTheSmaller) {
   Vector value(1);
-  GreatestTargetValue<double>(q, q, 0.75, &value);
+  MeanOfSmaller<double>(q1_, q2_, &value);
   EXPECT_TRUE(std::isnan(value[0]));
 }
+
+TEST_P(NaNOfACriticsDraw, ReachesTheLossOfThePolicy) {
+  for (const bool normalize : {false, true}) {
+    QTerm<double> term;
+    SmallerMeanQTerm<double>({.use_q = true, .normalize = normalize}, q1_, q2_, 1, &term);
+    EXPECT_TRUE(std::isnan(term.value) && std::isnan(term.loss)) << normalize;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, NaNOfACriticsDraw,
+                         testing::Combine(testing::Values(1, 2), testing::Values(0, 1, 2)),
+                         [](const auto& info) {
+                           return "Critic" + std::to_string(std::get<0>(info.param)) + "Draw" +
+                                  std::to_string(std::get<1>(info.param));
+                         });
 
 TEST(MeanOfSmallerTest, AveragesTheSmallerTwinOfEachDraw) {
   Matrix q1(1, 4), q2(1, 4);

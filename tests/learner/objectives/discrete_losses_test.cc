@@ -294,5 +294,71 @@ TEST(TargetValue, MixesTheTwinsUnderThePolicy) {
   EXPECT_EQ(value[0], 0) << "a state without legal actions has no value";
 }
 
+// The twins of two states and two actions; one entry of one of them is a NaN.
+class NaNOfACritic : public testing::TestWithParam<int> {
+ protected:
+  NaNOfACritic() {
+    q1_ << 1, 4, 2, 5;
+    q2_ << 3, 2, 0, 7;
+    (GetParam() == 1 ? q1_ : q2_)(0, 0) = NAN;
+  }
+
+  Matrix q1_{2, 2}, q2_{2, 2};
+  Categorical<double> policy_ = Softmax(Matrix::Zero(2, 2), Matrix::Ones(2, 2));
+};
+
+TEST_P(NaNOfACritic, ReachesTheTargetValueOfItsStateAlone) {
+  for (const double min_weight : {0.0, 0.75, 1.0}) {
+    Vector value;
+    ExpectedTargetValue<double>(policy_, q1_, q2_, min_weight, &value);
+    EXPECT_TRUE(std::isnan(value[0])) << min_weight;
+    EXPECT_TRUE(std::isfinite(value[1])) << min_weight;
+  }
+}
+
+TEST_P(NaNOfACritic, ReachesTheAdvantageOfItsStateAlone) {
+  std::vector<float> advantages;
+  ComputeAdvantages<double>(q1_, q2_, Matrix::Zero(1, 2), Vector::Zero(2), &advantages);
+  EXPECT_TRUE(std::isnan(advantages[0]));
+  EXPECT_EQ(advantages[1], 2);
+}
+
+TEST_P(NaNOfACritic, ReachesTheLossesOfThePolicy) {
+  Vector entropy;
+  Matrix gradient;
+  const auto soft = DiscreteSoftPolicyLoss<double>(policy_, q1_, q2_, 0.5, &entropy, &gradient);
+  EXPECT_TRUE(std::isnan(soft.value) && std::isnan(soft.loss));
+  PolicyLossWorkspace<double> workspace;
+  for (const bool normalize : {false, true}) {
+    PolicyLossOptions options;
+    options.normalize_q = normalize;
+    const auto loss =
+        ConstrainedPolicyLoss<double>(options, {policy_, q1_, q2_}, {policy_, 0.1, 1}, &workspace, &gradient);
+    EXPECT_TRUE(std::isnan(loss.value) && std::isnan(loss.loss)) << normalize;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, NaNOfACritic, testing::Values(1, 2),
+                         [](const auto& info) { return info.param == 1 ? "First" : "Second"; });
+
+TEST(GreedyValue, ANaNOfTheChooserOrTheJudgeIsNotPassedOver) {
+  for (const int place : {0, 1, 2}) {
+    Matrix chooser(3, 1);
+    chooser << 1, 3, 2;
+    const Matrix judge = chooser, masks = Matrix::Ones(3, 1);
+    chooser(place, 0) = NAN;
+    Vector value;
+    GreedyValue<double>(chooser, judge, masks, &value);
+    EXPECT_TRUE(std::isnan(value[0])) << place;
+  }
+  Matrix chooser(2, 1), judge(2, 1), masks(2, 1);
+  chooser << NAN, 1;
+  judge << 5, 6;
+  masks << 0, 1;
+  Vector value;
+  GreedyValue<double>(chooser, judge, masks, &value);
+  EXPECT_EQ(value[0], 6) << "no one looks at what is illegal";
+}
+
 }  // namespace
 }  // namespace dbr
