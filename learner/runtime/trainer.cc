@@ -30,15 +30,13 @@ absl::Status Trainer::Run() {
   last_record_ = last_checkpoint_ = MonotonicNow();
   updates_at_record_ = updates_;
   Publish();
-  absl::Status status;
-  while (status.ok() && (config_.max_updates() == 0 || updates_ < config_.max_updates()))
-    status = UpdateOnce();
-  const bool stopped = absl::IsCancelled(status);
-  if (!status.ok() && !stopped) return status;  // the state may be worthless: the checkpoints before it stay
+  const End end = UpdateToTheEnd();
+  if (!end.state_is_sound) return end.status;  // the checkpoints before it stay
   Publish();
-  RETURN_IF_ERROR(parts_.saver->SaveNow(MakeCheckpoint()));
-  spdlog::info("saved at update {}", updates_);
-  if (!stopped) {
+  const absl::Status saved = Save();
+  if (!end.status.ok()) return end.status;
+  RETURN_IF_ERROR(saved);
+  if (end.finished) {
     SetStatus(/*finished=*/true);
     absl::MutexLock lock(&mutex_);
     mutex_.Await(absl::Condition(&stopping_));
@@ -47,13 +45,39 @@ absl::Status Trainer::Run() {
 }
 
 void Trainer::Stop() {
+  {
+    absl::MutexLock lock(&mutex_);
+    stopping_ = true;
+  }
   parts_.prefetcher->Close();
-  absl::MutexLock lock(&mutex_);
-  stopping_ = true;
 }
 
-absl::Status Trainer::UpdateOnce() {
-  ASSIGN_OR_RETURN(std::unique_ptr<DrawnBatches> drawn, parts_.prefetcher->Next());
+bool Trainer::Stopping() {
+  absl::MutexLock lock(&mutex_);
+  return stopping_;
+}
+
+absl::Status Trainer::Save() {
+  const absl::Status saved = parts_.saver->SaveNow(MakeCheckpoint());
+  if (saved.ok()) {
+    spdlog::info("saved at update {}", updates_);
+  } else {
+    spdlog::error("no checkpoint at update {}: {}", updates_, std::string(saved.message()));
+  }
+  return saved;
+}
+
+Trainer::End Trainer::UpdateToTheEnd() {
+  while (config_.max_updates() == 0 || updates_ < config_.max_updates()) {
+    absl::StatusOr<std::unique_ptr<DrawnBatches>> drawn = parts_.prefetcher->Next();
+    if (!drawn.ok()) return {.status = Stopping() ? absl::OkStatus() : drawn.status()};
+    const absl::Status updated = Update(*std::move(drawn));
+    if (!updated.ok()) return {.status = updated, .state_is_sound = false};
+  }
+  return {.status = absl::OkStatus(), .finished = true};
+}
+
+absl::Status Trainer::Update(std::unique_ptr<DrawnBatches> drawn) {
   RETURN_IF_ERROR(parts_.algorithm->Update({drawn->uniform, drawn->plus, drawn->minus}));
   parts_.relabeller->Offer(snapshot_.version, drawn->uniform.keys, parts_.algorithm->advantages());
   parts_.prefetcher->Recycle(std::move(drawn));

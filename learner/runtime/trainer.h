@@ -47,15 +47,25 @@ class Trainer {
 
   // Publishes the first policy, then updates until Stop, an error, or max_updates; saves at the end. After
   // max_updates it goes on serving until Stop. Blocks until then. OK after Stop. Errors: the final error of
-  // the draws (Prefetcher), those of Algorithm::Update (nothing is saved after these: the state may be
-  // worthless), and those of the last save.
+  // the draws (Prefetcher), after which the state is saved too; those of Algorithm::Update, after which it is
+  // worthless and nothing is saved; and those of the last save.
   absl::Status Run();
   void Stop();  // ends the draws and wakes Run
 
   std::uint64_t updates() const { return updates_; }
 
  private:
-  absl::Status UpdateOnce();
+  // How the updates ended. Errors from outside leave the state as good as it was before them.
+  struct End {
+    absl::Status status;         // OK after Stop, and where all updates are made
+    bool finished = false;       // all updates are made
+    bool state_is_sound = true;  // false: an update failed
+  };
+  End UpdateToTheEnd();
+  // Makes one update and what is due after it. Errors are those of Algorithm::Update.
+  absl::Status Update(std::unique_ptr<DrawnBatches> drawn);
+  absl::Status Save();
+  bool Stopping();
   void Publish();          // offers the newest policy under the next version
   void Record();           // writes a row of metrics
   void MaybeCheckpoint();  // offers a checkpoint where the last one is old enough

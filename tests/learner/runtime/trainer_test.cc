@@ -15,6 +15,7 @@
 #include "replay/client/writer.h"
 #include "replay/service/replay_server.h"
 #include "tests/learner/algorithms/batches.h"
+#include "tests/replay/rows.h"
 #include "tests/support/temp_dir.h"
 
 namespace dbr {
@@ -66,12 +67,14 @@ class TrainerTest : public testing::Test {
   }
 
   std::unique_ptr<Trainer> MakeTrainer(std::uint64_t max_updates) {
+    return MakeTrainer(max_updates, MakeAlgorithm(SmallSpec()).value());
+  }
+  std::unique_ptr<Trainer> MakeTrainer(std::uint64_t max_updates, std::unique_ptr<Algorithm> algorithm) {
     LearnerConfig config;
     config.set_max_updates(max_updates);
     config.set_push_every(10);
     config.set_metrics_every(10);
-    AlgorithmSpec spec = SmallSpec();
-    TrainerParts parts{.algorithm = MakeAlgorithm(spec).value(),
+    TrainerParts parts{.algorithm = std::move(algorithm),
                        .policy_service = &service_,
                        .metrics = metrics_.get(),
                        .saver = &saver_,
@@ -92,9 +95,10 @@ class TrainerTest : public testing::Test {
     service_.SetStatus(LearnerStatus());  // clears the end of an earlier run
     std::thread thread([&] { EXPECT_TRUE(trainer->Run().ok()); });
     const absl::Time deadline = absl::Now() + absl::Seconds(60);
+    const LearnerStatusRequest request;
     LearnerStatus status;
     while (!status.finished() && absl::Now() < deadline) {
-      service_.Status(nullptr, nullptr, &status);
+      service_.Status(nullptr, &request, &status);
       std::this_thread::yield();
     }
     EXPECT_TRUE(status.finished());
@@ -221,6 +225,77 @@ TEST_F(TrainerTest, StopsWhileTheRateLimiterHoldsTheFirstDraw) {
   trainer->Stop();
   thread.join();
   EXPECT_EQ(trainer->updates(), 0u);
+}
+
+TEST_F(TrainerTest, SavesWhatIsSoundWhereTheReplayIsGoneForGood) {
+  Insert(100);
+  auto trainer = MakeTrainer(/*max_updates=*/0);
+  absl::Status ended;
+  std::thread thread([&] { ended = trainer->Run(); });
+  LearnerStatus status;
+  while (status.updates() == 0) {
+    LearnerStatusRequest request;
+    service_.Status(nullptr, &request, &status);
+    std::this_thread::yield();
+  }
+  // A server of other widths takes its place: no other try can mend that.
+  Config config;
+  config.mutable_replay()->set_capacity(1000);
+  config.mutable_replay()->set_min_size(64);
+  constexpr TransitionLayout kOther{6, 1, 3};
+  StartReplay(OptionsFrom(config, kOther));
+  TransitionWriter writer({.address = replay_->address(), .name = "other", .layout = kOther});
+  const Rows rows(kOther, 1, 100);
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_TRUE(
+        writer.Append(rows.columns().Row(kOther, i), kUnjudged, 0, std::nullopt, absl::Seconds(10)).ok());
+  }
+  thread.join();
+  EXPECT_TRUE(absl::IsInvalidArgument(ended)) << ended;
+  EXPECT_GT(trainer->updates(), 0u);
+  const auto policy = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
+  ASSERT_TRUE(policy.ok()) << policy.status();
+  EXPECT_EQ(policy->updates, trainer->updates());
+  const auto saved = Checkpoints(RunFolder{folder_.path()}.checkpoints(), 3).LoadNewest();
+  ASSERT_TRUE(saved.ok()) << saved.status();
+  trainer.reset();  // it ends before the clients that it uses
+  EXPECT_TRUE(MakeTrainer(0)->Load(saved->file).ok());
+}
+
+// An algorithm whose second update fails. Its state is worthless from then on, whatever the code of the
+// error.
+class Breaking final : public Algorithm {
+ public:
+  Breaking(std::unique_ptr<Algorithm> sound, absl::Status error)
+      : sound_(std::move(sound)), error_(std::move(error)) {}
+
+  absl::Status Update(const UpdateBatches& batches) override {
+    return updates_++ == 0 ? sound_->Update(batches) : error_;
+  }
+  BatchNeeds needs() const override { return sound_->needs(); }
+  absl::Span<const float> advantages() const override { return sound_->advantages(); }
+  absl::Span<const UpdateMetric> metrics() const override { return sound_->metrics(); }
+  double UpdateFlops() const override { return sound_->UpdateFlops(); }
+  void ExportPolicy(PolicySnapshot* snapshot) const override { sound_->ExportPolicy(snapshot); }
+  void Save(TensorFile* file) const override { sound_->Save(file); }
+  absl::Status Load(const TensorFile& file) override { return sound_->Load(file); }
+
+ private:
+  const std::unique_ptr<Algorithm> sound_;
+  const absl::Status error_;
+  int updates_ = 0;
+};
+
+TEST_F(TrainerTest, SavesNothingAfterAnUpdateThatFailed) {
+  Insert(100);
+  for (const absl::Status& error : {absl::InternalError("not finite"), absl::CancelledError("half an update"),
+                                    absl::InvalidArgumentError("half an update")}) {
+    const auto trainer =
+        MakeTrainer(0, std::make_unique<Breaking>(MakeAlgorithm(SmallSpec()).value(), error));
+    EXPECT_EQ(trainer->Run(), error);
+    EXPECT_TRUE(
+        absl::IsNotFound(Checkpoints(RunFolder{folder_.path()}.checkpoints(), 3).LoadNewest().status()));
+  }
 }
 
 TEST_F(TrainerTest, ABatchOfOtherWidthsIsAFinalError) {
