@@ -13,6 +13,7 @@
 #include "deploy/manual/man_page.h"
 #include "nn/blas_setup.h"
 #include "proto/config/config_file.h"
+#include "proto/rpc/exit_status.h"
 #include "proto/rpc/service_main.h"
 
 namespace dbr {
@@ -53,18 +54,18 @@ void Declare(CLI::App* app, Flags* flags) {
   app->footer("Example: dbr-actor --config my.textproto --run-dir runs/mine --index 0");
 }
 
-int Fail(const absl::Status& status, int exit_code) {
+int Fail(const absl::Status& status) {
   spdlog::error("{}", std::string(status.message()));
-  return exit_code;
+  return ExitStatusOf(status);
 }
 
 // Connects the shutdown signals to a process's Stop, runs the process to its end and returns the exit code.
 template <class Process>
 int RunProcess(const absl::StatusOr<std::unique_ptr<Process>>& process) {
-  if (!process.ok()) return Fail(process.status(), absl::IsInvalidArgument(process.status()) ? 2 : 1);
+  if (!process.ok()) return Fail(process.status());
   const ShutdownWatcher watcher([&process] { (*process)->Stop(); });
   const absl::Status status = (*process)->Run();
-  return status.ok() ? 0 : Fail(status, 1);
+  return status.ok() ? 0 : Fail(status);
 }
 
 int Main(int argc, char** argv) {
@@ -77,13 +78,13 @@ int Main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    return app.exit(error) == 0 ? 0 : kFinalExit;
   }
   const std::string name = flags.evaluate ? "evaluator" : absl::StrCat("actor-", flags.index);
   spdlog::set_default_logger(spdlog::stderr_color_mt(name));
 
   absl::StatusOr<Config> config = LoadConfig(flags.config);
-  if (!config.ok()) return Fail(config.status(), 2);
+  if (!config.ok()) return Fail(config.status());
   const RunFolder run{flags.run_dir};
   const ActorOptions options = {
       .config = *config,

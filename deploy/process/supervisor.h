@@ -14,12 +14,13 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
+#include "core/exit_status.h"
 #include "deploy/process/guard.h"
 
 namespace dbr {
 
-// The exit status of our programs for wrong flags or a wrong config. A restart would not help.
-inline constexpr int kBadConfigExit = 2;
+// The exit status of our programs for wrong flags, a wrong config or another final error.
+inline constexpr int kBadConfigExit = kFinalExit;
 
 struct ProcessSpec {
   std::string name;                            // "actor-0"
@@ -69,8 +70,8 @@ class Supervisor {
 
   // Blocks until `deadline`, Wake(), a signal or the end of a child, and restarts children that died. An
   // error means that the whole cannot continue. It names the first failure with its exit status or signal and
-  // the last lines of its log: InvalidArgument where a child refused its config, Aborted where one died too
-  // often.
+  // the last lines of its log: InvalidArgument where a child ended with kBadConfigExit, Aborted where one
+  // died too often.
   absl::Status Wait(absl::Time deadline);
 
   // Returns the processes with `once` that have ended since the last call, in the order in which they were

@@ -23,6 +23,7 @@
 #include "nn/blas_setup.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/deadline.h"
+#include "proto/rpc/exit_status.h"
 #include "proto/rpc/server.h"
 #include "proto/rpc/service_main.h"
 #include "replay/client/await_stats.h"
@@ -152,12 +153,12 @@ int Main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    return app.exit(error) == 0 ? 0 : kFinalExit;
   }
   const absl::StatusOr<Config> config = LoadConfig(arguments.config_path);
   if (!config.ok()) {
     spdlog::error("{}", std::string(config.status().message()));
-    return 2;
+    return ExitStatusOf(config.status());
   }
   std::error_code error;
   std::filesystem::create_directories(arguments.folder.root, error);
@@ -167,7 +168,7 @@ int Main(int argc, char** argv) {
   arguments.address = ChooseAddress(arguments.address, config->learner().address(), folder.learner_address());
   if (const absl::Status status = Serve(arguments, *config); !status.ok()) {
     spdlog::error("{}", std::string(status.message()));
-    return absl::IsInvalidArgument(status) ? 2 : 1;
+    return ExitStatusOf(status);
   }
   return 0;
 }

@@ -16,6 +16,7 @@
 #include "envs/env.h"
 #include "envs/registry/registry.h"
 #include "proto/config/config_file.h"
+#include "proto/rpc/exit_status.h"
 #include "proto/rpc/service_main.h"
 #include "replay/dataset/dataset_facts.h"
 #include "replay/service/replay_server.h"
@@ -92,18 +93,18 @@ int Main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    return app.exit(error) == 0 ? 0 : kFinalExit;
   }
   const absl::StatusOr<Config> config = LoadConfig(arguments.config_path);
   if (!config.ok()) {
     spdlog::error("{}", std::string(config.status().message()));
-    return 2;
+    return ExitStatusOf(config.status());
   }
   std::error_code error;
   if (!arguments.resume) std::filesystem::create_directories(arguments.folder.root, error);
   if (const absl::Status status = Serve(arguments, *config); !status.ok()) {
     spdlog::error("{}", std::string(status.message()));
-    return absl::IsInvalidArgument(status) ? 2 : 1;
+    return ExitStatusOf(status);
   }
   return 0;
 }

@@ -156,19 +156,19 @@ TEST_F(ProgramTest, EndsCleanlyOnASignalWhileThereIsNoLearner) {
   }
 }
 
-TEST_F(ProgramTest, APolicyOfOtherSizesExitsWith1) {
+TEST_F(ProgramTest, APolicyOfOtherSizesExitsWith2AsAnotherStartWouldNotHelp) {
   LearnerDouble learner(folder_.Address("learner"));
   learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
   Program actor(Flags("network { hidden_sizes: [32, 16] } actor { envs: 4 }"));
-  EXPECT_EQ(actor.Wait(), 1);
+  EXPECT_EQ(actor.Wait(), 2);
   EXPECT_THAT(actor.output(), HasSubstr("hidden_sizes: expected 32-16, found 16-16"));
 }
 
-TEST_F(ProgramTest, ALearnerOfAnotherProtocolExitsWith1AndSaysWhichProgramIsOlder) {
+TEST_F(ProgramTest, ALearnerOfAnotherProtocolExitsWith2AndSaysWhichProgramIsOlder) {
   LearnerDouble learner(folder_.Address("learner"), /*protocol_version=*/0);
   learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
   Program actor(Flags(kSmall));
-  EXPECT_EQ(actor.Wait(), 1);
+  EXPECT_EQ(actor.Wait(), 2);
   EXPECT_THAT(actor.output(), HasSubstr("found 0 (a program from before 0.2.0): the learner is older"));
 }
 

@@ -6,6 +6,8 @@
 #include <set>
 #include <string>
 
+#include "proto/rpc/exit_status.h"
+
 namespace dbr {
 namespace {
 
@@ -35,6 +37,16 @@ TEST(GrpcStatusTest, AServerWithoutTheServiceIsTakenForAnotherProgram) {
   const absl::Status status = FromGrpc(grpc::Status(grpc::StatusCode::UNIMPLEMENTED, ""));
   EXPECT_TRUE(IsFinal(status));
   EXPECT_THAT(std::string(status.message()), testing::HasSubstr("another program"));
+}
+
+TEST(ExitStatusTest, SaysWhetherAnotherStartMayHelp) {
+  EXPECT_EQ(ExitStatusOf(absl::OkStatus()), 0);
+  EXPECT_EQ(ExitStatusOf(absl::InvalidArgumentError("another width")), kFinalExit);
+  EXPECT_EQ(ExitStatusOf(absl::FailedPreconditionError("another protocol")), kFinalExit);
+  EXPECT_EQ(ExitStatusOf(absl::DataLossError("a damaged file")), kFinalExit);
+  EXPECT_EQ(ExitStatusOf(absl::UnavailableError("away")), 1);
+  EXPECT_EQ(ExitStatusOf(absl::InternalError("not finite")), 1);
+  EXPECT_EQ(ExitStatusOf(absl::ResourceExhaustedError("the disk is full")), 1);
 }
 
 }  // namespace

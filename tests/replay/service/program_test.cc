@@ -154,7 +154,8 @@ TEST_F(ReplayProgram, SaysWhatIsWrongAndHowToGoOn) {
   EXPECT_THAT(Log(), HasSubstr("replay.min_size"));
   WriteConfig("replay { capacity: 2000 }");
   Start({"--resume"});
-  EXPECT_EQ(WEXITSTATUS(End(0)), 1);
+  EXPECT_EQ(WEXITSTATUS(End(0)), 2);
+  EXPECT_THAT(Log(), HasSubstr("replay.store"));
   Start({"--address", "0.0.0.0:0"});
   EXPECT_EQ(WEXITSTATUS(End(0)), 2);
   EXPECT_THAT(Log(), HasSubstr("--allow-insecure"));
