@@ -11,8 +11,8 @@
 namespace dbr::report {
 namespace {
 
-// One run's evaluations; of two at one place the later one, for a run that was resumed has passed there
-// twice.
+// One run's evaluations. A learner that was started again has passed some places twice: a later evaluation
+// takes the place of those before it that are at its place or behind.
 using Track = std::map<double, double>;
 
 Track TrackOf(const RunSummary& summary, const std::string& opponent, Axis axis) {
@@ -22,7 +22,9 @@ Track TrackOf(const RunSummary& summary, const std::string& opponent, Axis axis)
     if (point.opponent != (opponent.empty() ? points[0].opponent : opponent)) continue;
     const double x = static_cast<double>(axis == Axis::kUpdates ? point.updates : point.steps);
     const double y = std::isfinite(point.score_mean) ? point.score_mean : point.return_mean;
-    if (std::isfinite(y)) track[x] = y;
+    if (!std::isfinite(y)) continue;
+    track.erase(track.lower_bound(x), track.end());
+    track[x] = y;
   }
   return track;
 }

@@ -60,6 +60,13 @@ std::string ScalarRecord(std::int64_t step, double wall_time, const Scalars& sca
   return FrameRecord(event.SerializeAsString());
 }
 
+std::string SessionStartRecord(std::int64_t step, double wall_time) {
+  tensorboard::Event event = EventAt(wall_time);
+  event.set_step(step);
+  event.mutable_session_log()->set_status(tensorboard::SessionLog::START);
+  return FrameRecord(event.SerializeAsString());
+}
+
 std::string EventFileName(double wall_time) {
   char host[256] = "host";
   gethostname(host, sizeof host - 1);

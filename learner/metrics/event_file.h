@@ -23,6 +23,10 @@ std::string VersionRecord(double wall_time);
 // The record of a row of scalars at `step`, which counts whatever the run counts by (updates, transitions).
 std::string ScalarRecord(std::int64_t step, double wall_time, const Scalars& scalars);
 
+// The record of a program that begins at `step`, after another one that may have gone further: TensorBoard
+// drops every scalar of earlier records whose step is `step` or greater, whatever it counts by.
+std::string SessionStartRecord(std::int64_t step, double wall_time);
+
 // "events.out.tfevents.SECONDS.HOST.PID": TensorBoard reads the files of a folder in the order of their
 // names, so that a resumed run continues in a file of its own.
 std::string EventFileName(double wall_time);

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/status_macros.h"
+#include "learner/metrics/repeated_rows.h"
 
 namespace dbr {
 namespace {
@@ -31,15 +32,32 @@ absl::StatusOr<std::unique_ptr<MetricsSink>> MetricsSink::Open(const RunFolder& 
                    AppendFile::Open(absl::StrCat(folder.root, "/", EventFileName(Seconds(now)))));
   RETURN_IF_ERROR(events->Append(VersionRecord(Seconds(now))));
   return std::unique_ptr<MetricsSink>(
-      new MetricsSink(std::move(rows), std::move(events), flush_interval, now));
+      new MetricsSink(folder.metrics(), std::move(rows), std::move(events), flush_interval, now));
 }
 
-MetricsSink::MetricsSink(std::unique_ptr<AppendFile> rows, std::unique_ptr<AppendFile> events,
-                         absl::Duration flush_interval, absl::Time now)
-    : rows_(std::move(rows)), events_(std::move(events)), flush_interval_(flush_interval), last_write_(now) {}
+MetricsSink::MetricsSink(std::string path, std::unique_ptr<AppendFile> rows,
+                         std::unique_ptr<AppendFile> events, absl::Duration flush_interval, absl::Time now)
+    : path_(std::move(path)),
+      rows_(std::move(rows)),
+      events_(std::move(events)),
+      flush_interval_(flush_interval),
+      last_write_(now) {}
 
 MetricsSink::~MetricsSink() {
   Flush().IgnoreError();
+}
+
+absl::Status MetricsSink::StartSession(std::int64_t step, absl::Time now) {
+  {
+    absl::MutexLock lock(&mutex_);
+    mutex_.Await(absl::Condition(this, &MetricsSink::Idle));
+    writing_ = true;
+  }
+  absl::Status status = events_->Append(SessionStartRecord(step, Seconds(now)));
+  if (status.ok()) status = RepeatWhatHolds(path_, step, events_.get());
+  absl::MutexLock lock(&mutex_);
+  writing_ = false;
+  return status;
 }
 
 absl::Status MetricsSink::Write(std::int64_t step, absl::Time now, const Scalars& scalars) {

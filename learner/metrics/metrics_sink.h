@@ -13,24 +13,9 @@
 #include "core/run_folder.h"
 #include "learner/metrics/append_file.h"
 #include "learner/metrics/event_file.h"
+#include "learner/metrics/tags.h"
 
 namespace dbr {
-
-// Tags that Stable-Baselines3 gives the same quantities, so that its users' dashboards fit. Other tags begin
-// with who measured: "replay/total", "learner/starved_share".
-namespace tags {
-inline constexpr char kEpisodeReturn[] = "rollout/ep_rew_mean";
-inline constexpr char kEpisodeLength[] = "rollout/ep_len_mean";
-inline constexpr char kEpisodeScore[] = "rollout/success_rate";
-inline constexpr char kTransitionsPerSecond[] = "time/fps";
-inline constexpr char kEpisodes[] = "time/episodes";
-inline constexpr char kTransitions[] = "time/total_timesteps";
-inline constexpr char kActorLoss[] = "train/actor_loss";
-inline constexpr char kCriticLoss[] = "train/critic_loss";
-inline constexpr char kUpdates[] = "train/n_updates";
-inline constexpr char kEvaluationReturn[] = "eval/mean_reward";
-inline constexpr char kEvaluationScore[] = "eval/success_rate";
-}  // namespace tags
 
 // The two files that a run's figures go to. Thread-safe. A row is written to disk by the first call of Write
 // at or after `flush_interval` from the write before, by Flush, or by the destructor. Nothing is lost by an
@@ -46,6 +31,12 @@ class MetricsSink {
   MetricsSink(const MetricsSink&) = delete;
   MetricsSink& operator=(const MetricsSink&) = delete;
 
+  // Tells TensorBoard that the learner begins at `step`, in updates: it drops what earlier event files hold
+  // of this step and later ones, which a learner that was killed had reached and this one reaches again. What
+  // still holds of that, the rows that count transitions, is repeated from metrics.jsonl. Belongs before the
+  // first Write. O(size of metrics.jsonl). Errors are those of the files.
+  absl::Status StartSession(std::int64_t step, absl::Time now) ABSL_LOCKS_EXCLUDED(mutex_);
+
   // Adds the row {"step": ..., "wall_time": seconds, tag: value, ...}; a value that is not finite is null
   // there. Blocks only to write the rows, and not where another thread is writing. Errors are those of the
   // file.
@@ -55,12 +46,13 @@ class MetricsSink {
   absl::Status Flush() ABSL_LOCKS_EXCLUDED(mutex_);
 
  private:
-  MetricsSink(std::unique_ptr<AppendFile> rows, std::unique_ptr<AppendFile> events,
+  MetricsSink(std::string path, std::unique_ptr<AppendFile> rows, std::unique_ptr<AppendFile> events,
               absl::Duration flush_interval, absl::Time now);
   // Writes what is pending. The caller has set writing_, which is cleared here.
   absl::Status WritePending() ABSL_LOCKS_EXCLUDED(mutex_);
   bool Idle() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return !writing_; }
 
+  const std::string path_;  // of the rows
   // Touched by the thread that has set writing_, without the lock.
   const std::unique_ptr<AppendFile> rows_;
   const std::unique_ptr<AppendFile> events_;

@@ -122,6 +122,7 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
                                 .depth = static_cast<int>(learner.prefetch())});
   Trainer trainer(learner, std::move(parts));
   if (arguments.resume) RETURN_IF_ERROR(Resume(arguments.folder, learner, &trainer));
+  RETURN_IF_ERROR(metrics->StartSession(static_cast<std::int64_t>(trainer.updates()), absl::Now()));
   RETURN_IF_ERROR(ContinueVersions(&stats, &trainer));
   ASSIGN_OR_RETURN(
       const RunningServer running,

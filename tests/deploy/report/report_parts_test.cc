@@ -57,6 +57,15 @@ TEST(CurveTest, IsTakenOverTheStretchThatAllSeedsShare) {
   EXPECT_THAT(MakeCurve(runs, 0, 0, "", Axis::kSteps).x, ElementsAre(1000, 1500, 2000));
 }
 
+TEST(CurveTest, WhatALearnerThatGoesBackMakesAgainTakesThePlaceOfWhatWasThere) {
+  Runs runs;
+  runs.cells = {Finished({At(100, 10), At(200, 20), At(300, 30), At(150, 15), At(200, 21)})};
+  const Curve curve = MakeCurve(runs, 0, 0, "", Axis::kUpdates);
+  EXPECT_EQ(curve.x.back(), 200) << "300 was never reached again";
+  EXPECT_EQ(curve.mean.front(), 10);
+  EXPECT_EQ(curve.mean.back(), 21);
+}
+
 TEST(CurveTest, LeavesOutOtherOpponentsAndRunsThatAreNotDone) {
   Runs runs;
   EvaluationPoint other = At(100, 99);

@@ -31,6 +31,7 @@ struct Event {
   double wall_time = 0;
   std::uint64_t step = 0;
   std::string file_version;
+  std::uint64_t session_status = 0;  // 1: a session starts
   std::map<std::string, float> scalars;
 };
 
@@ -63,9 +64,10 @@ void ReadScalar(const std::string& bytes, Event* event) {
   event->scalars[value.field(0).length_delimited()] = BitsAs<float>(value.field(1).fixed32());
 }
 
-// Reads the Event message by its field numbers: 1 wall_time, 2 step, 3 file_version, 5 summary (1: values).
+// Reads the Event message by its field numbers: 1 wall_time, 2 step, 3 file_version, 5 summary (1: values), 7
+// session_log (1: status).
 Event ReadEvent(const std::string& bytes) {
-  UnknownFieldSet fields, summary;
+  UnknownFieldSet fields, summary, session;
   EXPECT_TRUE(fields.ParseFromString(bytes));
   Event event;
   for (int i = 0; i < fields.field_count(); ++i) {
@@ -75,6 +77,12 @@ Event ReadEvent(const std::string& bytes) {
     if (field.number() == 3) event.file_version = field.length_delimited();
     if (field.number() == 5) {
       EXPECT_TRUE(summary.ParseFromString(field.length_delimited()));
+    }
+    if (field.number() == 7) {
+      EXPECT_TRUE(session.ParseFromString(field.length_delimited()));
+      EXPECT_EQ(session.field_count(), 1);
+      EXPECT_EQ(session.field(0).number(), 1);
+      event.session_status = session.field(0).varint();
     }
   }
   for (int i = 0; i < summary.field_count(); ++i) ReadScalar(summary.field(i).length_delimited(), &event);
@@ -214,6 +222,60 @@ TEST_F(MetricsSinkTest, AResumedRunGoesOnWithItsRowsAndAnEventFileOfItsOwn) {
   const auto files = EventFiles();
   ASSERT_EQ(files.size(), 2u);
   for (const std::string& file : files) EXPECT_EQ(ReadEvents(file).size(), 2u);
+}
+
+TEST_F(MetricsSinkTest, ASessionBeginsWithTheStepThatItGoesOnFrom) {
+  const auto sink = Open();
+  ASSERT_TRUE(sink->StartSession(3320, kStart).ok());
+  ASSERT_TRUE(sink->Write(3340, kStart, {{tags::kActorLoss, 0.1}}).ok());
+  ASSERT_TRUE(sink->Flush().ok());
+  const auto events = ReadEvents(EventFiles().at(0));
+  ASSERT_EQ(events.size(), 3u);
+  EXPECT_EQ(events[0].file_version, "brain.Event:2");
+  EXPECT_EQ(events[1].session_status, 1u);
+  EXPECT_EQ(events[1].step, 3320u);
+  EXPECT_TRUE(events[1].scalars.empty());
+  EXPECT_EQ(events[2].step, 3340u);
+  EXPECT_EQ(Rows().size(), 1u) << "metrics.jsonl has no line for it";
+}
+
+// What TensorBoard shows of a run: it reads the files in order, and a start drops what lies at its step and
+// behind, of every tag.
+std::map<std::string, std::map<std::uint64_t, float>> Shown(const std::vector<std::string>& files) {
+  std::map<std::string, std::map<std::uint64_t, float>> shown;
+  for (const std::string& file : files) {
+    for (const Event& event : ReadEvents(file)) {
+      if (event.session_status == 1) {
+        for (auto& [tag, values] : shown) values.erase(values.lower_bound(event.step), values.end());
+      }
+      for (const auto& [tag, value] : event.scalars) shown[tag][event.step] = value;
+    }
+  }
+  return shown;
+}
+
+TEST_F(MetricsSinkTest, AResumedSessionDropsWhatTheLearnerMakesAgainAndNothingElse) {
+  const auto train = [](double loss) { return Scalars{{tags::kActorLoss, loss}}; };
+  const auto rollout = [](double step) {
+    return Scalars{{tags::kTransitions, step}, {tags::kEpisodeReturn, step / 2}};
+  };
+  {
+    const auto killed = Open();
+    ASSERT_TRUE(killed->StartSession(0, kStart).ok());
+    for (const int step : {10, 20, 30, 40}) ASSERT_TRUE(killed->Write(step, kStart, train(step)).ok());
+    for (const int step : {5, 15, 1000, 2000}) ASSERT_TRUE(killed->Write(step, kStart, rollout(step)).ok());
+  }
+  std::ofstream(run_.metrics(), std::ios::app) << "{}\nno row\n";
+  {
+    const auto resumed = Open(kStart + absl::Seconds(10));
+    ASSERT_TRUE(resumed->StartSession(20, kStart + absl::Seconds(10)).ok());
+    ASSERT_TRUE(resumed->Write(30, kStart, train(33)).ok());
+    ASSERT_TRUE(resumed->Write(3000, kStart, rollout(3000)).ok());
+  }
+  auto shown = Shown(EventFiles());
+  EXPECT_EQ(shown[tags::kActorLoss], (std::map<std::uint64_t, float>{{10, 10}, {20, 20}, {30, 33}}));
+  EXPECT_EQ(shown[tags::kEpisodeReturn],
+            (std::map<std::uint64_t, float>{{5, 2.5f}, {15, 7.5f}, {1000, 500}, {2000, 1000}, {3000, 1500}}));
 }
 
 TEST_F(MetricsSinkTest, AFullDiskIsSaidAndTheRowsAreKept) {
