@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/check.h"
 #include "proto/rpc/codec.h"
 
 namespace dbr {
@@ -35,7 +36,7 @@ void Outbox::Append(const TransitionView& transition, float advantage, std::uint
 
 void Outbox::StartMessage(absl::Time now) {
   if (spare_.empty()) {
-    filling_ = std::make_shared<InsertRequest>();
+    filling_ = std::make_unique<InsertRequest>();
   } else {
     filling_ = std::move(spare_.back());
     spare_.pop_back();
@@ -56,21 +57,23 @@ absl::Time Outbox::NextTime(bool waited_for) const {
   return since + options_.max_batch_age;
 }
 
-std::shared_ptr<const InsertRequest> Outbox::Next(absl::Time now, bool waited_for) {
+const InsertRequest* Outbox::Next(absl::Time now, bool waited_for) {
+  DBR_CHECK(lent_ == nullptr);
   if (NextTime(waited_for) > now) return nullptr;
   const bool early = !CanSend();
   if (early && filling_ == nullptr) {
-    auto question = std::make_shared<InsertRequest>();
-    question->set_acknowledge(true);
+    question_.set_acknowledge(true);
     sent_unasked_ = 0;
-    return question;
+    lent_ = &question_;
+    return lent_;
   }
   if (early) sealed_.push_back(std::move(filling_));
   return Send(early, now);
 }
 
-std::shared_ptr<const InsertRequest> Outbox::Send(bool early, absl::Time now) {
-  std::shared_ptr<InsertRequest> message = sealed_[sent_++];
+const InsertRequest* Outbox::Send(bool early, absl::Time now) {
+  InsertRequest* message = sealed_[sent_++].get();
+  lent_ = message;
   last_sent_ = now;
   ++sent_unasked_;
   message->set_acknowledge(early || sent_unasked_ >= messages_per_acknowledgement_);
@@ -82,11 +85,20 @@ void Outbox::Acknowledge(const InsertReply& reply) {
   acknowledged_ = std::max(acknowledged_, std::min(reply.acknowledged_sequence(), appended_));
   refused_ = std::max(refused_, reply.refused());
   while (!sealed_.empty() && LastSequence(*sealed_.front()) <= acknowledged_) {
-    // Whoever sends it may still hold it.
-    if (sealed_.front().use_count() == 1) spare_.push_back(std::move(sealed_.front()));
+    std::unique_ptr<InsertRequest> message = std::move(sealed_.front());
     sealed_.pop_front();
+    if (message.get() == lent_) {
+      lent_acknowledged_ = std::move(message);
+    } else {
+      spare_.push_back(std::move(message));
+    }
     if (sent_ > 0) --sent_;
   }
+}
+
+void Outbox::GiveBack() {
+  lent_ = nullptr;
+  if (lent_acknowledged_ != nullptr) spare_.push_back(std::move(lent_acknowledged_));
 }
 
 void Outbox::Restart() {

@@ -52,10 +52,13 @@ class Outbox {
   // The time from which Next has a message: the past where it has one now, the time when what there is will
   // be old, or the infinite future. `waited_for`: somebody waits for room or for the last acknowledgement.
   absl::Time NextTime(bool waited_for) const;
-  // The next message to send, or null where NextTime is later than `now`. The outbox and the caller share it:
-  // it must not be changed, and it may come again on another stream. A message without transitions asks for
-  // an acknowledgement alone.
-  std::shared_ptr<const InsertRequest> Next(absl::Time now, bool waited_for);
+  // The next message to send, or null where NextTime is later than `now`. The outbox lends it: it stays as it
+  // is until GiveBack, also where it is acknowledged before, and may come again on another stream. Requires
+  // that the message before was given back. A message without transitions asks for an acknowledgement alone.
+  const InsertRequest* Next(absl::Time now, bool waited_for);
+  // Gives back what Next has lent; does nothing where it has lent nothing. From then on the memory of an
+  // acknowledged message may hold another one.
+  void GiveBack();
 
   // Takes the server's word that it holds all up to a sequence number.
   void Acknowledge(const InsertReply& reply);
@@ -71,14 +74,17 @@ class Outbox {
   bool WindowOpen() const { return sent_ < options_.window; }
   bool CanSend() const { return WindowOpen() && sent_ < sealed_.size(); }
   void StartMessage(absl::Time now);
-  std::shared_ptr<const InsertRequest> Send(bool early, absl::Time now);
+  const InsertRequest* Send(bool early, absl::Time now);
 
   const OutboxOptions options_;
   const std::size_t messages_per_acknowledgement_;
-  std::shared_ptr<InsertRequest> filling_;  // null before its first transition
+  std::unique_ptr<InsertRequest> filling_;  // null before its first transition
   absl::Time filling_since_;
-  std::deque<std::shared_ptr<InsertRequest>> sealed_;  // not acknowledged, in order
-  std::vector<std::shared_ptr<InsertRequest>> spare_;  // to be filled again
+  std::deque<std::unique_ptr<InsertRequest>> sealed_;  // not acknowledged, in order
+  std::vector<std::unique_ptr<InsertRequest>> spare_;  // to be filled again
+  const InsertRequest* lent_ = nullptr;                // in sealed_, lent_acknowledged_ or question_
+  std::unique_ptr<InsertRequest> lent_acknowledged_;   // null, or what is lent and no longer in sealed_
+  InsertRequest question_;                             // asks for an acknowledgement alone
   std::size_t sent_ = 0;                               // how many of sealed_ are sent on this stream
   std::size_t sent_unasked_ = 0;                       // how many since one that asks for acknowledgement
   absl::Time last_sent_;

@@ -123,9 +123,10 @@ class TransitionWriter::Impl {
                                                     " acknowledged by ", options_.address));
   }
 
-  // Waits for the next message to send; null where the stream is to end.
-  std::shared_ptr<const InsertRequest> NextMessage() ABSL_LOCKS_EXCLUDED(mutex_) {
+  // Gives the message before back and waits for the next one to send; null where the stream is to end.
+  const InsertRequest* NextMessage() ABSL_LOCKS_EXCLUDED(mutex_) {
     absl::MutexLock lock(&mutex_);
+    outbox_.GiveBack();
     for (;;) {
       const absl::Time next_time = outbox_.NextTime(callers_waiting_ > 0);
       const auto sooner = [this, next_time]() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) {
@@ -133,7 +134,7 @@ class TransitionWriter::Impl {
       };
       AwaitUntil(&mutex_, absl::Condition(&sooner), next_time);
       if (closed_ || broken_) return nullptr;
-      if (auto message = outbox_.Next(MonotonicNow(), callers_waiting_ > 0)) return message;
+      if (const InsertRequest* message = outbox_.Next(MonotonicNow(), callers_waiting_ > 0)) return message;
     }
   }
 
@@ -192,10 +193,12 @@ class TransitionWriter::Impl {
     if (opened.ok()) {
       failures_ = 0;
       std::thread reader([this, &stream] { ReadReplies(stream.get()); });
-      while (const auto message = NextMessage()) {
+      while (const InsertRequest* message = NextMessage()) {
         if (!stream->Write(*message)) break;
       }
       reader.join();
+      absl::MutexLock lock(&mutex_);
+      outbox_.GiveBack();
     }
     if (IsFinal(opened)) context.TryCancel();
     const grpc::Status ended = stream->Finish();

@@ -26,9 +26,12 @@ class OutboxTest : public ::testing::Test {
     return reply;
   }
   // All messages that Next gives now.
-  std::vector<std::shared_ptr<const InsertRequest>> SendAll(bool waited_for = false) {
-    std::vector<std::shared_ptr<const InsertRequest>> sent;
-    while (auto message = outbox_.Next(now_, waited_for)) sent.push_back(message);
+  std::vector<InsertRequest> SendAll(bool waited_for = false) {
+    std::vector<InsertRequest> sent;
+    while (const InsertRequest* message = outbox_.Next(now_, waited_for)) {
+      sent.push_back(*message);
+      outbox_.GiveBack();
+    }
     return sent;
   }
 
@@ -41,9 +44,9 @@ TEST_F(OutboxTest, SendsFullMessagesAtOnceAndInOrder) {
   const auto sent = SendAll();
   ASSERT_EQ(sent.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_EQ(sent[i]->first_sequence(), 10 * i + 1);
-    EXPECT_EQ(sent[i]->transitions().count(), 10u);
-    EXPECT_EQ(sent[i]->transitions().rewards(9), Rows::Value(10 * i + 10));
+    EXPECT_EQ(sent[i].first_sequence(), 10 * i + 1);
+    EXPECT_EQ(sent[i].transitions().count(), 10u);
+    EXPECT_EQ(sent[i].transitions().rewards(9), Rows::Value(10 * i + 10));
   }
 }
 
@@ -52,7 +55,7 @@ TEST_F(OutboxTest, SendsAMessageThatIsNotFullWhenItIsOld) {
   EXPECT_EQ(outbox_.NextTime(false), now_ + kAge);
   EXPECT_TRUE(outbox_.Next(now_, false) == nullptr);
   now_ += kAge;
-  const auto message = outbox_.Next(now_, false);
+  const InsertRequest* message = outbox_.Next(now_, false);
   ASSERT_TRUE(message != nullptr);
   EXPECT_EQ(message->transitions().count(), 3u);
   EXPECT_TRUE(message->acknowledge());
@@ -74,7 +77,7 @@ TEST_F(OutboxTest, NeverHasMoreThanTheWindowUnderWay) {
   EXPECT_EQ(outbox_.acknowledged(), 25u);
   const auto sent = SendAll();
   ASSERT_EQ(sent.size(), 2u);
-  EXPECT_EQ(sent[0]->first_sequence(), 81u);
+  EXPECT_EQ(sent[0].first_sequence(), 81u);
 }
 
 TEST_F(OutboxTest, AFullWindowAlwaysHasAnAcknowledgementUnderWay) {
@@ -86,7 +89,8 @@ TEST_F(OutboxTest, AFullWindowAlwaysHasAnAcknowledgementUnderWay) {
     // A server that answers exactly when it is asked takes all.
     while (outbox.acknowledged() < 100) {
       std::uint64_t asked = 0;
-      while (const auto message = outbox.Next(now_, true)) {
+      while (const InsertRequest* message = outbox.Next(now_, true)) {
+        outbox.GiveBack();  // it stays as it is until something is acknowledged
         if (message->has_transitions()) asked = message->acknowledge() ? message->first_sequence() : asked;
         if (!message->has_transitions()) asked = 100;
       }
@@ -101,7 +105,7 @@ TEST_F(OutboxTest, AsksForTheLastAcknowledgementAfterAWhile) {
   ASSERT_EQ(SendAll().size(), 1u);  // full, and so without a question
   EXPECT_EQ(outbox_.NextTime(false), now_ + kAge);
   now_ += kAge;
-  const auto question = outbox_.Next(now_, false);
+  const InsertRequest* question = outbox_.Next(now_, false);
   ASSERT_TRUE(question != nullptr);
   EXPECT_TRUE(question->acknowledge());
   EXPECT_FALSE(question->has_transitions());
@@ -116,9 +120,9 @@ TEST_F(OutboxTest, SendsAgainWhatIsNotAcknowledged) {
   outbox_.Acknowledge(Reply(30));  // the opening of the new stream tells of more
   const auto sent = SendAll(true);
   ASSERT_EQ(sent.size(), 2u);
-  EXPECT_EQ(sent[0]->first_sequence(), 31u);
-  EXPECT_EQ(sent[1]->first_sequence(), 41u);
-  EXPECT_EQ(sent[1]->transitions().count(), 5u);
+  EXPECT_EQ(sent[0].first_sequence(), 31u);
+  EXPECT_EQ(sent[1].first_sequence(), 41u);
+  EXPECT_EQ(sent[1].transitions().count(), 5u);
 }
 
 TEST_F(OutboxTest, TakesNoAcknowledgementOfWhatItNeverHad) {
@@ -130,13 +134,34 @@ TEST_F(OutboxTest, TakesNoAcknowledgementOfWhatItNeverHad) {
   EXPECT_EQ(outbox_.acknowledged(), 15u);
 }
 
-TEST_F(OutboxTest, AMessageThatIsStillBeingSentIsNotFilledAgain) {
+TEST_F(OutboxTest, AMessageThatIsLentStaysAsItIsUntilItIsGivenBack) {
+  Append(20);
+  const InsertRequest* lent = outbox_.Next(now_, false);
+  outbox_.Acknowledge(Reply(10));  // before the call that sends it has returned
+  Append(40);
+  EXPECT_EQ(lent->first_sequence(), 1u);
+  EXPECT_EQ(lent->transitions().count(), 10u);
+  EXPECT_EQ(lent->transitions().rewards(0), Rows::Value(1));
+  outbox_.GiveBack();
+  EXPECT_EQ(SendAll()[0].first_sequence(), 11u);
+  Append(10);  // into the memory of the first one
+  outbox_.Acknowledge(Reply(60));
+  const InsertRequest* reused = outbox_.Next(now_, false);
+  EXPECT_EQ(reused, lent);
+  EXPECT_EQ(reused->first_sequence(), 61u);
+}
+
+TEST_F(OutboxTest, AMessageThatIsLentAndNotAcknowledgedIsSentAgain) {
   Append(10);
-  const auto held = outbox_.Next(now_, false);
-  outbox_.Acknowledge(Reply(10));
+  ASSERT_NE(outbox_.Next(now_, false), nullptr);
+  outbox_.GiveBack();  // the stream broke
+  outbox_.Restart();
   Append(10);
-  EXPECT_EQ(held->first_sequence(), 1u);
-  EXPECT_EQ(held->transitions().rewards(0), Rows::Value(1));
+  const auto sent = SendAll();
+  ASSERT_EQ(sent.size(), 2u);
+  EXPECT_EQ(sent[0].first_sequence(), 1u);
+  EXPECT_EQ(sent[0].transitions().rewards(0), Rows::Value(1));
+  EXPECT_EQ(sent[1].first_sequence(), 11u);
 }
 
 }  // namespace
