@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -113,24 +114,36 @@ TEST_F(Buffer, InsertsAreFreeWhileADrawWaitsForAnEmptyPartition) {
   learner.join();
 }
 
-TEST_F(Buffer, CloseEndsTheWaitOfAnInsert) {
+// How many clients of the buffer wait in `call`.
+std::uint64_t Waiting(const PartitionedBuffer& buffer, const std::string& call) {
+  for (const BlockedCalls& blocked : buffer.Stats().blocked) {
+    if (blocked.call == call) return blocked.clients;
+  }
+  return 0;
+}
+
+TEST_F(Buffer, CloseWakesAnInsertThatWaits) {
   buffer_options_.limiter = {.samples_per_insert = 1, .tolerance = 10, .min_size = 10};
   Make();
   ASSERT_FALSE(Insert(1, 100).ok());
-  std::thread writer(
-      [this] { EXPECT_EQ(Insert(500, 10, 1, kNever).code(), absl::StatusCode::kUnavailable); });
+  const absl::Time patience = absl::Now() + absl::Seconds(20);  // only a failure waits that long
+  std::thread writer([&] { EXPECT_EQ(Insert(500, 10, 1, patience).code(), absl::StatusCode::kUnavailable); });
+  while (Waiting(*buffer_, "insert") == 0 && absl::Now() < patience) std::this_thread::yield();
   buffer_->Close();
   writer.join();
+  EXPECT_LT(absl::Now(), patience) << "the deadline ended the wait, and not Close";
   EXPECT_EQ(buffer_->OpenWriter({.id = 5, .name = "late"}).status().code(), absl::StatusCode::kUnavailable);
 }
 
-TEST_F(Buffer, CloseEndsTheWaitsOfDraws) {
+TEST_F(Buffer, CloseWakesDrawsThatWaitAndRefusesLaterOnes) {
   Make();
-  std::thread early(
-      [this] { EXPECT_EQ(Draw(1, 0, 0, true, kNever).code(), absl::StatusCode::kUnavailable); });
+  const absl::Time patience = absl::Now() + absl::Seconds(20);
+  std::thread early([&] { EXPECT_EQ(Draw(1, 0, 0, true, patience).code(), absl::StatusCode::kUnavailable); });
+  while (Waiting(*buffer_, "sample") == 0 && absl::Now() < patience) std::this_thread::yield();
   buffer_->Close();
   early.join();
-  EXPECT_EQ(Draw(1, 0, 0, true, kNever).code(), absl::StatusCode::kUnavailable);
+  EXPECT_LT(absl::Now(), patience) << "the deadline ended the wait, and not Close";
+  EXPECT_EQ(Draw(1, 0, 0, true, patience).code(), absl::StatusCode::kUnavailable);
 }
 
 }  // namespace
