@@ -3,14 +3,12 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "core/rng.h"
-#include "core/safetensors.h"
 #include "core/status_macros.h"
 #include "envs/registry/registry.h"
 #include "proto/config/config_file.h"
@@ -189,7 +187,7 @@ absl::StatusOr<std::unique_ptr<EvaluatorProcess>> EvaluatorProcess::Create(const
 }
 
 EvaluatorProcess::EvaluatorProcess(const ActorOptions& options, const EnvSpec& env)
-    : best_policy_(options.best_policy),
+    : best_(options.best_policy, MeasureOf(env.name, Evaluating(options, env.name))),
       learner_(options.learner_address),
       subscriber_(
           Subscription(options, env, "evaluator", Rng(options.config.seed()).Fork(kEvaluatorStream)())),
@@ -199,7 +197,8 @@ EvaluatorProcess::EvaluatorProcess(const ActorOptions& options, const EnvSpec& e
            .report = [this](const EvaluationReport& report) { return Report(report); },
            .next_policy = [this](const PolicySubscriber::PolicyPtr& last,
                                  absl::Duration timeout) { return subscriber_.WaitForOther(last, timeout); },
-           .keep_best = [this](const PolicySnapshot& snapshot) { KeepBest(snapshot); }}) {}
+           .on_mean = [this](double mean, const PolicySnapshot& snapshot) { best_.Offer(mean, snapshot); }}) {
+}
 
 absl::Status EvaluatorProcess::Run() {
   return loop_.Run();
@@ -208,14 +207,6 @@ absl::Status EvaluatorProcess::Run() {
 void EvaluatorProcess::Stop() {
   loop_.Close();
   subscriber_.Close();
-}
-
-void EvaluatorProcess::KeepBest(const PolicySnapshot& snapshot) const {
-  if (best_policy_.empty()) return;
-  std::error_code ignored;  // SavePolicy then reports the error
-  std::filesystem::create_directories(std::filesystem::path(best_policy_).parent_path(), ignored);
-  const absl::Status saved = SavePolicy(snapshot, best_policy_);
-  if (!saved.ok()) spdlog::error("the best policy so far is not kept: {}", std::string(saved.message()));
 }
 
 absl::Status EvaluatorProcess::Report(const EvaluationReport& report) {

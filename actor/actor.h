@@ -7,6 +7,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
+#include "actor/best_policy.h"
 #include "actor/evaluation_loop.h"
 #include "actor/policy_subscriber.h"
 #include "actor/step_loop.h"
@@ -77,9 +78,8 @@ class EvaluatorProcess {
   EvaluatorProcess(const ActorOptions& options, const EnvSpec& env);
 
   absl::Status Report(const EvaluationReport& report);
-  void KeepBest(const PolicySnapshot& snapshot) const;
 
-  const std::string best_policy_;
+  BestPolicy best_;
   LearnerClient learner_;
   PolicySubscriber subscriber_;
   EvaluationLoop loop_;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "core/monotonic_clock.h"
 #include "core/status_macros.h"
 #include "envs/registry/registry.h"
@@ -49,6 +51,12 @@ std::vector<std::string> OpponentsToEvaluate(const std::string& env,
   std::vector<std::string> opponents = configured.empty() ? EvaluationOpponents(env) : configured;
   if (opponents.empty()) opponents.emplace_back();
   return opponents;
+}
+
+std::string MeasureOf(const std::string& env, const EvaluationLoopOptions& options) {
+  const std::string opponents = absl::StrJoin(options.opponents, ", ");
+  return absl::StrCat(env, opponents.empty() ? "" : " against ", opponents, " by ",
+                      ActingMode_Name(options.mode));
 }
 
 EvaluationLoop::EvaluationLoop(EvaluationLoopOptions options, EvaluationLoopPorts ports)
@@ -147,18 +155,12 @@ absl::Status EvaluationLoop::EvaluateAll(const PolicyNetworks& policy, const Ite
     if (iterations.current.has_value()) unsent_.back().set_iteration(*iterations.current);
     unsent_.back().mutable_skipped_iterations()->Assign(iterations.skipped.begin(), iterations.skipped.end());
     if (unsent_.size() > kMaxUnsent) unsent_.pop_front();
-    if (&opponent == &options_.opponents.back()) {
-      KeepIfBest(sum / static_cast<double>(options_.opponents.size()), snapshot);
+    if (&opponent == &options_.opponents.back() && ports_.on_mean) {
+      ports_.on_mean(sum / static_cast<double>(options_.opponents.size()), snapshot);
     }
     SendReports();
   }
   return absl::OkStatus();
-}
-
-void EvaluationLoop::KeepIfBest(double mean, const PolicySnapshot& snapshot) {
-  if (!ports_.keep_best || !(mean > best_)) return;
-  best_ = mean;
-  ports_.keep_best(snapshot);
 }
 
 void EvaluationLoop::SendReports() {

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -46,9 +45,9 @@ struct EvaluationLoopPorts {
   std::function<absl::StatusOr<std::shared_ptr<const PolicyNetworks>>(
       const std::shared_ptr<const PolicyNetworks>& last, absl::Duration timeout)>
       next_policy = nullptr;
-  // Receives the policy whose mean over the opponents (of scores, else of returns) is the greatest so far,
-  // before it is reported. May be null.
-  std::function<void(const PolicySnapshot&)> keep_best = nullptr;
+  // Receives each policy with its mean over the opponents (of scores, else of returns), before the last of
+  // its reports. May be null.
+  std::function<void(double mean, const PolicySnapshot&)> on_mean = nullptr;
   std::function<absl::Time()> now = MonotonicNow;
   // Returns at the deadline, or at once after Close(). Null means waiting by the real clock.
   std::function<void(absl::Time)> wait_until = nullptr;
@@ -91,7 +90,6 @@ class EvaluationLoop {
   absl::Status EvaluateIfDue(const PolicyNetworks& policy);
   Iterations Reach(std::uint64_t iteration);
   absl::Status EvaluateAll(const PolicyNetworks& policy, const Iterations& iterations);
-  void KeepIfBest(double mean, const PolicySnapshot& snapshot);
   void SendReports();
 
   const EvaluationLoopOptions options_;
@@ -100,12 +98,14 @@ class EvaluationLoop {
   std::optional<std::uint64_t> last_iteration_;      // the last one evaluated; by updates
   std::uint64_t skipped_ = 0;                        // the number of iterations skipped so far
   std::deque<EvaluationReport> unsent_;
-  double best_ = -std::numeric_limits<double>::infinity();
   bool said_loss_ = false;
   std::atomic<bool> closing_ = false;
   absl::Mutex mutex_;
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
 };
+
+// What a mean over these evaluations is taken over, in words: "connect4 against random, mcts:10 by MODE".
+std::string MeasureOf(const std::string& env, const EvaluationLoopOptions& options);
 
 // Returns `configured`, or EvaluationOpponents(env) where `configured` is empty, or {""} where both are
 // empty.

@@ -1,4 +1,6 @@
 // A policy as a safetensors file: the spec, the version and the order of the networks stand in the metadata.
+#include "core/policy_file.h"
+
 #include <map>
 #include <utility>
 
@@ -74,7 +76,7 @@ class MetadataReader {
 
 }  // namespace
 
-absl::Status SavePolicy(const PolicySnapshot& snapshot, const std::string& path) {
+absl::StatusOr<TensorFile> PolicyTensors(const PolicySnapshot& snapshot) {
   TensorFile file;
   std::vector<std::string> names;
   for (const auto& [name, parameters] : snapshot.networks) {
@@ -97,6 +99,11 @@ absl::Status SavePolicy(const PolicySnapshot& snapshot, const std::string& path)
                    {"updates", absl::StrCat(snapshot.updates)},
                    {"support_epsilon", absl::StrFormat("%.9g", snapshot.support_epsilon)},
                    {"networks", absl::StrJoin(names, ",")}};
+  return file;
+}
+
+absl::Status SavePolicy(const PolicySnapshot& snapshot, const std::string& path) {
+  ASSIGN_OR_RETURN(const TensorFile file, PolicyTensors(snapshot));
   return SaveTensors(file, path);
 }
 

@@ -28,17 +28,19 @@ class EvaluationLoopTest : public ::testing::Test {
   explicit EvaluationLoopTest(const EvaluationLoopOptions& options) : loop_(options, Ports()) {}
 
   EvaluationLoopPorts Ports() {
-    return {.newest_policy = [this] { return newest_; },
-            .report = [this](const EvaluationReport& report) { return Report(report); },
-            .next_policy = [this](const auto& last, absl::Duration) { return NextPolicy(last); },
-            .keep_best = [this](const PolicySnapshot& snapshot) { kept_.push_back(snapshot.version); },
-            .now = [this] { return now_; },
-            .wait_until =
-                [this](absl::Time deadline) {
-                  waits_.push_back(deadline - now_);
-                  now_ = std::max(now_, deadline);
-                  PlayNext();
-                }};
+    return {
+        .newest_policy = [this] { return newest_; },
+        .report = [this](const EvaluationReport& report) { return Report(report); },
+        .next_policy = [this](const auto& last, absl::Duration) { return NextPolicy(last); },
+        .on_mean = [this](double mean,
+                          const PolicySnapshot& snapshot) { means_.emplace_back(snapshot.version, mean); },
+        .now = [this] { return now_; },
+        .wait_until =
+            [this](absl::Time deadline) {
+              waits_.push_back(deadline - now_);
+              now_ = std::max(now_, deadline);
+              PlayNext();
+            }};
   }
 
   // Plays the script's next entry and returns its result: a policy, an error, or nothing new before the
@@ -63,7 +65,7 @@ class EvaluationLoopTest : public ::testing::Test {
     reports_.emplace_back(report.policy_version(), report.opponent());
     scores_[report.policy_version()] += report.score_mean();
     whole_reports_.push_back(report);
-    kept_at_report_.push_back(kept_);
+    means_at_report_.push_back(means_.size());
     return absl::OkStatus();
   }
 
@@ -76,9 +78,9 @@ class EvaluationLoopTest : public ::testing::Test {
   int attempts_ = 0;
   std::vector<std::pair<std::uint64_t, std::string>> reports_;
   std::vector<EvaluationReport> whole_reports_;
-  std::map<std::uint64_t, double> scores_;  // by version, summed over the opponents
-  std::vector<std::uint64_t> kept_;         // the versions that were the best so far, in order
-  std::vector<std::vector<std::uint64_t>> kept_at_report_;
+  std::map<std::uint64_t, double> scores_;               // by version, summed over the opponents
+  std::vector<std::pair<std::uint64_t, double>> means_;  // of each version
+  std::vector<std::size_t> means_at_report_;             // how many there were before each report
   std::vector<absl::Duration> waits_;
   std::deque<std::function<void()>> script_;
   EvaluationLoop loop_;
@@ -112,23 +114,18 @@ TEST_F(EvaluationLoopTest, KeepsItsDeadlinesAndCatchesUpAfterALongRound) {
   EXPECT_THAT(waits_, ElementsAre(absl::Seconds(4), absl::Seconds(10), absl::ZeroDuration()));
 }
 
-TEST_F(EvaluationLoopTest, KeepsEachPolicyThatIsBetterThanAllBeforeIt) {
+TEST_F(EvaluationLoopTest, GivesTheMeanOfEachPolicyBeforeItsLastReport) {
   Push(1);
   for (std::uint64_t version = 2; version <= 8; ++version)
     script_.push_back([this, version] { Push(version); });
   ASSERT_TRUE(loop_.Run().ok());
-  std::vector<std::uint64_t> expected;
-  double best = -1;
-  for (const auto& [version, score] : scores_) {
-    if (score > best) expected.push_back(version);
-    best = std::max(best, score);
-  }
-  EXPECT_EQ(kept_, expected);
-  EXPECT_GT(kept_.size(), 1u);
-  EXPECT_LT(kept_.size(), 8u);
-  // The policy is kept before the last report of its round, because a reader of that report may stop the run.
-  EXPECT_THAT(kept_at_report_[0], IsEmpty());
-  EXPECT_THAT(kept_at_report_[1], ElementsAre(1));
+  std::vector<std::pair<std::uint64_t, double>> expected;
+  for (const auto& [version, score] : scores_) expected.emplace_back(version, score / 2);
+  EXPECT_EQ(means_, expected);
+  EXPECT_EQ(means_.size(), 8u);
+  // A reader of the last report may stop the run.
+  EXPECT_EQ(means_at_report_[0], 0u);
+  EXPECT_EQ(means_at_report_[1], 1u);
 }
 
 TEST_F(EvaluationLoopTest, KeepsReportsWhileThereIsNoLearner) {
