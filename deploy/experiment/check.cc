@@ -1,7 +1,5 @@
 #include "deploy/experiment/check.h"
 
-#include <sys/un.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <map>
@@ -14,7 +12,6 @@
 #include "absl/strings/str_join.h"
 #include "absl/strings/strip.h"
 #include "actor/evaluation_loop.h"
-#include "core/run_folder.h"
 #include "core/space.h"
 #include "core/status_macros.h"
 #include "deploy/experiment/cell.h"
@@ -164,12 +161,6 @@ const Task& TaskOf(const Experiment& experiment, const Cell& cell) {
                        [&cell](const Task& task) { return task.name() == cell.task; });
 }
 
-// Whether the path of the longer of the cell's two sockets is short enough.
-bool SocketFits(const Cell& cell) {
-  const std::string address = RunFolder{cell.folder}.learner_address();
-  return absl::StripPrefix(address, "unix:").size() < sizeof(sockaddr_un::sun_path);
-}
-
 // What is wrong with the grid itself.
 std::vector<std::string> FindGridErrors(const Experiment& experiment) {
   std::vector<std::string> errors;
@@ -240,13 +231,6 @@ void FindCellErrors(const Experiment& experiment, const std::vector<Cell>& cells
     errors->push_back(absl::StrCat("task '", cell.task, "': expected its seed buffer, found no file '", path,
                                    "'", RecordCommand(TaskOf(experiment, cell), path)));
   }
-  const auto longest = std::max_element(cells.begin(), cells.end(), [](const Cell& a, const Cell& b) {
-    return a.folder.size() < b.folder.size();
-  });
-  if (longest == cells.end() || SocketFits(*longest)) return;
-  errors->push_back(absl::StrCat("--run-dir: expected a path short enough for the unix sockets within (",
-                                 sizeof(sockaddr_un::sun_path) - 1, " bytes), found '", longest->folder,
-                                 "'; choose a shorter one, or one relative to the working folder"));
 }
 
 }  // namespace

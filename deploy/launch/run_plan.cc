@@ -6,7 +6,6 @@
 #include <thread>
 #include <utility>
 
-#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "actor/evaluator.h"
 #include "actor/exploration.h"
@@ -20,18 +19,26 @@
 #include "learner/algorithm.h"
 #include "learner/algorithms/registry.h"
 #include "proto/config/config_file.h"
+#include "proto/rpc/address.h"
 #include "replay/service/replay_server.h"
 #include "replay/service/seed_buffer_import.h"
 
 namespace dbr {
 namespace {
 
-// The launcher tells others the address before the server listens.
-absl::Status CheckAddress(const std::string& configured, const char* field) {
-  if (!absl::EndsWith(configured, ":0")) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat(field, ": expected an address that the other processes can be told, found '", configured,
-                   "'. Name a port, or leave it out for a unix socket."));
+// OK where the address of a section of the config, if it names one, is one that the launcher can hand to others
+// before the server listens. `field`: the section's.
+template <class Section>
+absl::Status CheckAddressToTell(const Section& section, const char* field) {
+  if (section.address().empty()) return absl::OkStatus();
+  const auto refuse = [field](absl::string_view why) {
+    return absl::InvalidArgumentError(absl::StrCat(field, ".address: ", why));
+  };
+  const absl::Status good = CheckServerAddress(section.address(), section.allow_insecure());
+  if (!good.ok()) return refuse(good.message());
+  if (ParseClientAddress(section.address()).ok()) return absl::OkStatus();
+  return refuse(absl::StrCat("expected an address that the other processes can be told, found '",
+                             section.address(), "'. Name a port, or leave it out for a unix socket."));
 }
 
 std::string DefaultRunDir(const Config& config, absl::Time now) {
@@ -176,8 +183,8 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
   RETURN_IF_ERROR(CheckFits(plan.config, plan.env));
   const ReplayConfig& replay = plan.config.replay();
   const LearnerConfig& learner = plan.config.learner();
-  RETURN_IF_ERROR(CheckAddress(replay.address(), "replay.address"));
-  RETURN_IF_ERROR(CheckAddress(learner.address(), "learner.address"));
+  RETURN_IF_ERROR(CheckAddressToTell(replay, "replay"));
+  RETURN_IF_ERROR(CheckAddressToTell(learner, "learner"));
   if (!replay.address().empty() && replay.address() == learner.address()) {
     return absl::InvalidArgumentError(
         absl::StrCat("replay.address and learner.address: expected two addresses, found '", replay.address(),

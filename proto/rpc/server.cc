@@ -1,6 +1,5 @@
 #include "proto/rpc/server.h"
 
-#include <arpa/inet.h>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -12,8 +11,9 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "absl/strings/strip.h"
+#include "absl/strings/str_replace.h"
 #include "core/status_macros.h"
+#include "proto/rpc/address.h"
 #include "proto/rpc/grpc_library.h"
 #include "proto/rpc/keepalive.h"
 
@@ -22,16 +22,7 @@ namespace {
 
 constexpr int kMaxMessageBytes = 256 << 20;
 
-// "127.x.y.z:PORT", "[::1]:PORT" or "localhost:PORT"; a name that only begins like one of these may be
-// anybody's.
-bool IsLoopback(absl::string_view address) {
-  const std::string host(address.substr(0, address.rfind(':')));
-  in_addr parsed;
-  if (inet_pton(AF_INET, host.c_str(), &parsed) == 1) return ntohl(parsed.s_addr) >> 24 == 127;
-  return host == "localhost" || host == "[::1]";
-}
-
-// Tries to connect: true where somebody answers at the socket.
+// Tries to connect: true where somebody answers at the socket, whose path is at most 107 bytes long.
 bool SocketIsServed(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
@@ -57,44 +48,38 @@ absl::Status AddressInUse(absl::string_view address) {
                    ": the address is in use. Stop the program that serves it or choose another address."));
 }
 
-absl::Status CheckAddress(const ServerOptions& options) {
-  const absl::string_view address = options.address;
-  if (absl::StartsWith(address, "unix:")) {
-    const std::string path(absl::StripPrefix(address, "unix:"));
-    constexpr std::size_t kMaxPath = sizeof(sockaddr_un::sun_path) - 1;
-    if (path.empty() || path.size() > kMaxPath) {
-      return absl::InvalidArgumentError(absl::StrCat("socket path '", path, "': expected 1 to ", kMaxPath,
-                                                     " characters, found ", path.size(),
-                                                     ". Use a shorter run folder."));
-    }
-    struct stat found;
-    if (lstat(path.c_str(), &found) != 0) return absl::OkStatus();
-    if (!S_ISSOCK(found.st_mode)) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "cannot listen on ", address, ": expected a socket or nothing at that path, found another file"));
-    }
-    if (SocketIsServed(path)) return AddressInUse(address);
-    unlink(path.c_str());
-    return absl::OkStatus();
+// Removes a socket that a killed server left at `path`, the reachable one of `address`.
+absl::Status MakeRoom(const std::string& path, absl::string_view address) {
+  struct stat found;
+  if (lstat(path.c_str(), &found) != 0) return absl::OkStatus();
+  if (!S_ISSOCK(found.st_mode)) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "cannot listen on ", address, ": expected a socket or nothing at that path, found another file"));
   }
-  if (address.find(':') == absl::string_view::npos) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("address '", address, "': expected unix:PATH or HOST:PORT, for example 127.0.0.1:0"));
-  }
-  if (!IsLoopback(address) && !options.allow_insecure) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("address '", address,
-                     "' can be reached from other machines and there is no authentication yet: "
-                     "use a unix socket or 127.0.0.1, or say --allow-insecure on a network that you trust."));
-  }
+  if (SocketIsServed(path)) return AddressInUse(address);
+  unlink(path.c_str());
   return absl::OkStatus();
+}
+
+std::string TcpAddress(const Address& address) {
+  const bool v6 = absl::StrContains(address.host, ':');
+  // gRPC decodes what it listens on, and an IPv6 address may have a '%' before its interface.
+  const std::string host =
+      v6 ? absl::StrCat("[", absl::StrReplaceAll(address.host, {{"%", "%25"}}), "]") : address.host;
+  return absl::StrCat(host, ":", address.port);
 }
 
 }  // namespace
 
 absl::StatusOr<RunningServer> StartServer(const ServerOptions& options,
                                           const std::vector<grpc::Service*>& services) {
-  RETURN_IF_ERROR(CheckAddress(options));
+  RETURN_IF_ERROR(CheckServerAddress(options.address, options.allow_insecure));
+  ASSIGN_OR_RETURN(const Address address, ParseAddress(options.address));
+  RunningServer running;
+  if (address.is_unix()) {
+    ASSIGN_OR_RETURN(running.socket, SocketPath::Open(address.path));
+    RETURN_IF_ERROR(MakeRoom(running.socket->reachable(), options.address));
+  }
   KeepGrpcInitialized();
   static std::once_flag plugins;
   std::call_once(plugins, [] {
@@ -103,7 +88,8 @@ absl::StatusOr<RunningServer> StartServer(const ServerOptions& options,
   });
   grpc::ServerBuilder builder;
   int port = 0;
-  builder.AddListeningPort(options.address, grpc::InsecureServerCredentials(), &port);
+  builder.AddListeningPort(address.is_unix() ? running.socket->GrpcAddress() : TcpAddress(address),
+                           grpc::InsecureServerCredentials(), &port);
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveTimeMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
@@ -111,12 +97,11 @@ absl::StatusOr<RunningServer> StartServer(const ServerOptions& options,
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kKeepaliveTimeMs / 2);
   builder.SetMaxReceiveMessageSize(kMaxMessageBytes);
   for (grpc::Service* service : services) builder.RegisterService(service);
-  RunningServer running;
   running.server = builder.BuildAndStart();
   if (running.server == nullptr || port == 0) return CannotListen(options.address);
   running.address = options.address;
-  if (absl::EndsWith(options.address, ":0")) {
-    running.address = absl::StrCat(absl::StripSuffix(options.address, "0"), port);
+  if (!address.is_unix() && address.port == 0) {
+    running.address = absl::StrCat(options.address.substr(0, options.address.rfind(':') + 1), port);
   }
   return running;
 }

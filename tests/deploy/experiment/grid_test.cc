@@ -23,6 +23,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::IsSupersetOf;
 using ::testing::StartsWith;
 
@@ -348,12 +349,10 @@ TEST_F(GridTest, ACellThatWasKilledBeforeItHadAStoreNeedsItsSeedBuffer) {
               HasSubstr("task 'hopper-medium': expected its seed buffer"));
 }
 
-TEST_F(GridTest, RefusesFoldersTooDeepForSockets) {
+TEST_F(GridTest, TakesFoldersOfAnyDepthAndName) {
   GridOptions options = Options();
-  options.run_dir = folder_ / std::string(100, 'x');
-  EXPECT_THAT(ErrorsOf(Changed({}), options),
-              ElementsAre(AllOf(HasSubstr("--run-dir: expected a path short enough for the unix sockets"),
-                                HasSubstr("hopper-medium/dbr/seed-1"))));
+  options.run_dir = folder_ / "a, run? " + std::string(200, 'x');
+  EXPECT_THAT(ErrorsOf(Changed({}), options), IsEmpty());
 }
 
 TEST(ParseExperimentTest, ReportsEveryErrorOfTheTextWithItsPlace) {

@@ -190,6 +190,18 @@ TEST_F(RunPlanTest, RefusesOneAddressForBothServices) {
   EXPECT_FALSE(std::filesystem::exists(run_));
 }
 
+TEST_F(RunPlanTest, AnAddressThatIsNoneIsRefusedBeforeAFolderIsMade) {
+  for (const char* field : {"replay.address", "learner.address"}) {
+    for (const char* address : {"127.0.0.1:99999", "127.0.0.1", "::1:80", "unix:", "0.0.0.0:7000"}) {
+      const auto plan = PrepareRun(Options({absl::StrCat(field, "='", address, "'")}), kNow);
+      EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument) << address;
+      EXPECT_THAT(std::string(plan.status().message()), AllOf(HasSubstr(field), HasSubstr(address)));
+      EXPECT_FALSE(std::filesystem::exists(run_)) << address;
+    }
+  }
+  EXPECT_TRUE(PrepareRun(Options({"replay.address='0.0.0.0:7000'", "replay.allow_insecure=true"}), kNow).ok());
+}
+
 TEST_F(RunPlanTest, RefusesAnAddressThatNobodyCouldBeTold) {
   const auto plan = PrepareRun(Options({"replay.address='127.0.0.1:0'"}), kNow);
   EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);

@@ -139,7 +139,11 @@ TEST(ReplayAddressTest, TakesAddressesAndRunFolders) {
   TempDir folder;
   EXPECT_EQ(*ReplayAddress("unix:some/replay.sock"), "unix:some/replay.sock");
   EXPECT_EQ(*ReplayAddress("127.0.0.1:7000"), "127.0.0.1:7000");
-  EXPECT_EQ(ReplayAddress("nothing").status().code(), absl::StatusCode::kInvalidArgument);
+  for (const char* none : {"nothing", "127.0.0.1:99999", "127.0.0.1:0", "unix:"}) {
+    const absl::Status status = ReplayAddress(none).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << none;
+    EXPECT_THAT(std::string(status.message()), AllOf(HasSubstr("--replay: "), HasSubstr(none)));
+  }
   EXPECT_EQ(ReplayAddress(folder.path()).status().code(), absl::StatusCode::kNotFound);
   ASSERT_TRUE(WriteFileAtomically(RunFolder{folder.path()}.config(), PrintConfig(Config())).ok());
   EXPECT_EQ(*ReplayAddress(folder.path()), absl::StrCat("unix:", folder.path(), "/replay.sock"));
