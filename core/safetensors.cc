@@ -11,6 +11,7 @@
 #include "absl/strings/str_format.h"
 #include "core/crc32c.h"
 #include "core/file_io.h"
+#include "core/json_text.h"
 #include "core/status_macros.h"
 
 namespace dbr {
@@ -140,9 +141,9 @@ absl::StatusOr<Json> ParseHeader(const std::string& bytes, const std::string& pa
     return Damaged(path, absl::StrCat("a header of ", *header_bytes, " bytes"),
                    absl::StrCat(bytes.size() - kPrefixBytes, " bytes after its length"));
   }
-  const char* text = bytes.data() + kPrefixBytes;
-  Json header = Json::parse(text, text + *header_bytes, nullptr, /*allow_exceptions=*/false);
-  if (!header.is_object()) return Damaged(path, "a JSON object as header", "something else");
+  absl::StatusOr<Json> header = ParseJson(absl::string_view(bytes).substr(kPrefixBytes, *header_bytes));
+  if (!header.ok()) return Damaged(path, "a JSON object as header", header.status().message());
+  if (!header->is_object()) return Damaged(path, "a JSON object as header", "something else");
   return header;
 }
 

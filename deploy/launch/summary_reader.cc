@@ -11,12 +11,13 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
+#include "core/json_text.h"
 #include "core/status_macros.h"
 
 namespace dbr {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = nlohmann::json;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
@@ -101,11 +102,16 @@ std::optional<RunEnding> ReadEnding(const Json& json) {
 }
 
 std::string FoundInPlaceOfEnding(const Json& json) {
-  if (json.is_discarded()) return "found text that is no JSON";
   const bool says_something = json.is_object() && json.contains("ended");
   return says_something
              ? absl::StrCat("found ", json["ended"].dump(-1, ' ', false, Json::error_handler_t::replace))
              : "found none";
+}
+
+absl::Status Damaged(const RunFolder& folder, absl::string_view found) {
+  return absl::DataLossError(
+      absl::StrCat(folder.summary(), " is damaged: expected a JSON object that says how the run 'ended', ",
+                   found, ". Run the cell again, or restore the file."));
 }
 
 void ReadCounters(const Json& json, RunSummary* summary) {
@@ -123,13 +129,11 @@ void ReadCounters(const Json& json, RunSummary* summary) {
 
 absl::StatusOr<RunSummary> LoadSummary(const RunFolder& folder) {
   ASSIGN_OR_RETURN(const std::string text, ReadFile(folder.summary()));
-  const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
+  const absl::StatusOr<Json> parsed = ParseJson(text);
+  if (!parsed.ok()) return Damaged(folder, absl::StrCat("found ", parsed.status().message()));
+  const Json& json = *parsed;
   const std::optional<RunEnding> ended = ReadEnding(json);
-  if (!ended.has_value()) {
-    return absl::DataLossError(
-        absl::StrCat(folder.summary(), " is damaged: expected a JSON object that says how the run 'ended', ",
-                     FoundInPlaceOfEnding(json), ". Run the cell again, or restore the file."));
-  }
+  if (!ended.has_value()) return Damaged(folder, FoundInPlaceOfEnding(json));
   RunSummary summary;
   summary.ended = *ended;
   summary.env = Text(json, "env");

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
+#include "core/json_text.h"
 #include "core/status_macros.h"
 
 namespace dbr {
@@ -52,9 +53,11 @@ absl::StatusOr<ReferencePosition> ReadPosition(const Json& entry, const std::str
 
 absl::StatusOr<std::vector<ReferencePosition>> LoadPositions(const std::string& path) {
   ASSIGN_OR_RETURN(const std::string text, ReadTextFile(path));
-  const Json json = Json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (json.is_discarded())
-    return absl::InvalidArgumentError(absl::StrCat(path, ": expected JSON, found something else"));
+  const absl::StatusOr<Json> parsed = ParseJson(text);
+  if (!parsed.ok())
+    return absl::InvalidArgumentError(
+        absl::StrCat(path, ": expected JSON, found ", parsed.status().message()));
+  const Json& json = *parsed;
   if (!json.is_object() || !json.contains("positions") || !json["positions"].is_array()) {
     return absl::InvalidArgumentError(absl::StrCat(path, ": expected an object with a list 'positions'"));
   }

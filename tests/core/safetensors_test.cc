@@ -150,6 +150,14 @@ TEST_F(SafetensorsTest, RefusesMalformedHeaders) {
   ExpectRefused(R"({"__metadata__":{"crc32c":"00000000"},)" + whole + "}", eight, "metadata 'crc32c_header'");
 }
 
+// Printing or copying such a header would exhaust the stack: both checksums are right until then.
+TEST_F(SafetensorsTest, RefusesAHeaderThatIsNestedDeep) {
+  const std::string deep = std::string(100000, '[') + std::string(100000, ']');
+  ExpectRefused("{\"__metadata__\":{},\"w\":" + deep + "}", "", "deep within each other");
+  ExpectRefused(R"({"w":{"dtype":)" + deep + R"(,"shape":[1],"data_offsets":[0,4]}})", "abcd", "deep within");
+  ExpectRefused(std::string(100000, '['), "", "deep within each other");
+}
+
 TEST_F(SafetensorsTest, RefusesAHeaderLongerThanTheFile) {
   std::string bytes = Saved(SmallFile());
   for (const std::uint64_t size : {bytes.size() - 7, std::uint64_t{1} << 40, ~std::uint64_t{0}}) {

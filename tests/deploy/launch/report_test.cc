@@ -340,6 +340,17 @@ TEST(ResultsTest, AnUnknownEndingIsDamageAndIsNamed) {
   EXPECT_THAT(std::string(status.message()), HasSubstr("found \"max_minutes\""));
 }
 
+// What is wrong with it is printed, and printing goes as deep as the value.
+TEST(ResultsTest, ASummaryThatIsNestedDeepIsDamage) {
+  TempDir folder;
+  const RunFolder run{folder.path()};
+  const std::string deep = std::string(100000, '[') + std::string(100000, ']');
+  ASSERT_TRUE(WriteFileAtomically(run.summary(), "{\"ended\": " + deep + "}").ok());
+  const absl::Status status = LoadSummary(run).status();
+  EXPECT_TRUE(absl::IsDataLoss(status)) << status;
+  EXPECT_THAT(std::string(status.message()), HasSubstr("more than 64 deep"));
+}
+
 TEST(StatsReportTest, TextShowsEverything) {
   const std::string text = StatsText("unix:run/replay.sock", SomeStats());
   for (const char* part :

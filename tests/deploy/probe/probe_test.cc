@@ -166,6 +166,7 @@ TEST(PositionsFileTest, NamesWhatIsWrong) {
     return std::string(status.message());
   };
   EXPECT_THAT(error("{\"positions\": [{\"moves\""), HasSubstr("expected JSON"));
+  EXPECT_THAT(error(std::string(100000, '[')), HasSubstr("expected JSON, found lists and objects more than"));
   EXPECT_THAT(error("[]"), HasSubstr("'positions'"));
   EXPECT_THAT(error("{\"positions\": []}"), HasSubstr("found none"));
   EXPECT_THAT(error("{\"positions\": [7]}"), HasSubstr("positions[0]: expected an object"));
