@@ -86,14 +86,19 @@ int Main(int argc, char** argv) {
   absl::StatusOr<Config> config = LoadConfig(flags.config);
   if (!config.ok()) return Fail(config.status());
   const RunFolder run{flags.run_dir};
-  const ActorOptions options = {
-      .config = *config,
-      .index = flags.index,
-      .processes = flags.processes,
-      .replay_address = ChooseAddress(flags.replay, config->replay().address(), run.replay_address()),
-      .learner_address = ChooseAddress(flags.learner, config->learner().address(), run.learner_address()),
-      .resumed = flags.resume,
-      .best_policy = run.best_policy()};
+  const absl::StatusOr<std::string> replay =
+      ChooseAddress(flags.replay, config->replay().address(), run.replay_address());
+  if (!replay.ok()) return Fail(replay.status(), 2);
+  const absl::StatusOr<std::string> learner =
+      ChooseAddress(flags.learner, config->learner().address(), run.learner_address());
+  if (!learner.ok()) return Fail(learner.status(), 2);
+  const ActorOptions options = {.config = *config,
+                                .index = flags.index,
+                                .processes = flags.processes,
+                                .replay_address = *replay,
+                                .learner_address = *learner,
+                                .resumed = flags.resume,
+                                .best_policy = run.best_policy()};
   return flags.evaluate ? RunProcess(EvaluatorProcess::Create(options)) : RunProcess(Actor::Create(options));
 }
 

@@ -9,6 +9,7 @@
 #include "core/safetensors.h"
 #include "core/status_macros.h"
 #include "proto/config/config_file.h"
+#include "proto/rpc/address.h"
 
 namespace dbr {
 
@@ -35,7 +36,11 @@ absl::StatusOr<std::string> ReplayAddress(const std::string& address_or_run) {
     return config.replay().address().empty() ? folder.replay_address() : config.replay().address();
   }
   if (std::filesystem::is_socket(address_or_run, ignored)) return absl::StrCat("unix:", address_or_run);
-  if (absl::StrContains(address_or_run, ':')) return address_or_run;
+  if (absl::StrContains(address_or_run, ':')) {
+    const absl::Status status = ParseClientAddress(address_or_run).status();
+    if (!status.ok()) return absl::InvalidArgumentError(absl::StrCat("--replay: ", status.message()));
+    return address_or_run;
+  }
   return absl::InvalidArgumentError(
       absl::StrCat("--replay: expected unix:PATH, HOST:PORT or a run folder, found '", address_or_run, "'"));
 }

@@ -140,6 +140,17 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
   return status;
 }
 
+// Fills in the addresses that no flag gives.
+absl::Status ChooseAddresses(const Config& config, Arguments* arguments) {
+  const RunFolder& folder = arguments->folder;
+  ASSIGN_OR_RETURN(
+      arguments->replay_address,
+      ChooseAddress(arguments->replay_address, config.replay().address(), folder.replay_address()));
+  ASSIGN_OR_RETURN(arguments->address,
+                   ChooseAddress(arguments->address, config.learner().address(), folder.learner_address()));
+  return absl::OkStatus();
+}
+
 int Main(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("learner"));
   CLI::App app("Trains an algorithm from a replay server and serves its policy.", "dbr-learner");
@@ -161,13 +172,13 @@ int Main(int argc, char** argv) {
     spdlog::error("{}", std::string(config.status().message()));
     return ExitStatusOf(config.status());
   }
-  std::error_code error;
-  std::filesystem::create_directories(arguments.folder.root, error);
-  const RunFolder& folder = arguments.folder;
-  arguments.replay_address =
-      ChooseAddress(arguments.replay_address, config->replay().address(), folder.replay_address());
-  arguments.address = ChooseAddress(arguments.address, config->learner().address(), folder.learner_address());
-  if (const absl::Status status = Serve(arguments, *config); !status.ok()) {
+  absl::Status status = ChooseAddresses(*config, &arguments);
+  if (status.ok()) {
+    std::error_code error;
+    std::filesystem::create_directories(arguments.folder.root, error);
+    status = Serve(arguments, *config);
+  }
+  if (!status.ok()) {
     spdlog::error("{}", std::string(status.message()));
     return ExitStatusOf(status);
   }

@@ -4,7 +4,9 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "absl/status/statusor.h"
 #include "core/run_folder.h"
+#include "proto/rpc/address.h"
 
 namespace dbr {
 
@@ -32,10 +34,13 @@ inline void AddServiceFlags(const std::string& folder_holds, const std::string& 
 }
 
 // The address that the flag gives, else the config's, else the run folder's; empty means not given.
-inline std::string ChooseAddress(const std::string& flag, const std::string& configured,
-                                 const std::string& otherwise) {
-  if (!flag.empty()) return flag;
-  return configured.empty() ? otherwise : configured;
+// InvalidArgument where it is none (proto/rpc/address.h).
+inline absl::StatusOr<std::string> ChooseAddress(const std::string& flag, const std::string& configured,
+                                                 const std::string& otherwise) {
+  const std::string& given = flag.empty() ? configured : flag;
+  const std::string& chosen = given.empty() ? otherwise : given;
+  if (const absl::Status status = ParseAddress(chosen).status(); !status.ok()) return status;
+  return chosen;
 }
 
 }  // namespace dbr

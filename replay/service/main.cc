@@ -34,8 +34,8 @@ absl::StatusOr<ReplayServerOptions> MakeOptions(const ServiceArguments& argument
   options.store.env = env->spec().name;
   options.store.path = arguments.folder.replay_store();
   options.store.resume = arguments.resume;
-  options.server.address =
-      ChooseAddress(arguments.address, config.replay().address(), arguments.folder.replay_address());
+  ASSIGN_OR_RETURN(options.server.address, ChooseAddress(arguments.address, config.replay().address(),
+                                                         arguments.folder.replay_address()));
   options.server.allow_insecure |= arguments.allow_insecure;
   return options;
 }

@@ -128,6 +128,16 @@ TEST_F(ProgramTest, BadUsageExitsWith2) {
   EXPECT_THAT(incomplete.output(), HasSubstr("--config"));
 }
 
+TEST_F(ProgramTest, WhatIsNoAddressExitsWith2) {
+  for (const char* option : {"--replay", "--learner"}) {
+    std::vector<std::string> flags = Flags(kSmall);
+    flags.insert(flags.end(), {option, "127.0.0.1:99999"});
+    Program program(flags);
+    EXPECT_EQ(program.Wait(), 2) << option;
+    EXPECT_THAT(program.output(), HasSubstr("'127.0.0.1:99999': expected unix:PATH or HOST:PORT")) << option;
+  }
+}
+
 TEST_F(ProgramTest, BadConfigExitsWith2AndNamesTheField) {
   Program program(Flags("actor { envs: 0 }"));
   EXPECT_EQ(program.Wait(), 2);

@@ -2,6 +2,7 @@
 // lost.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -99,6 +100,28 @@ TEST_F(BadInputTest, AnAddressInUseIsNamed) {
   EXPECT_EQ(status, 1) << output;
   EXPECT_THAT(output, AllOf(HasSubstr(taken->address), HasSubstr("in use")));
   EXPECT_THAT(ProcessesOf("dbr", run_.root), IsEmpty());
+}
+
+TEST_F(BadInputTest, AnAddressThatIsNoneMakesNoFolder) {
+  const auto [status, output] = Launch({"--set", "replay.address='127.0.0.1:99999'"});
+  EXPECT_EQ(status, 2) << output;
+  EXPECT_THAT(output, AllOf(HasSubstr("replay.address: "), HasSubstr("port '99999'")));
+  EXPECT_FALSE(std::filesystem::exists(run_.root));
+}
+
+// A comma, a percent sign, brackets of a URI, and more bytes than the path of a socket has.
+TEST_F(BadInputTest, ARunFolderOfAnyNameTrainsAndAnswers) {
+  const RunFolder run{folder_ / ("a run, 100%41 #1?[x]*\n\xff " + std::string(200, 'y'))};
+  DbrProcess launch("dbr", {"launch", SmallConfig(), "--run-dir", run.root});
+  ASSERT_TRUE(launch.AwaitOutput("updates/s")) << launch.output();
+  const auto [asked, stats] = RunProgram("dbr", {"stats", "--replay", run.root, "--json"});
+  EXPECT_EQ(asked, 0) << stats;
+  launch.Signal(SIGINT);
+  EXPECT_EQ(launch.Wait(), 130) << launch.output();
+  const auto [status, output] =
+      RunProgram("dbr", {"launch", "--resume", "--run-dir", run.root, "--set", "launch.max_seconds=1",
+                         "--set", "evaluation.final_episodes=2"});
+  EXPECT_EQ(status, 0) << output;
 }
 
 TEST_F(BadInputTest, AServerThatIsNotThereIsNamed) {
