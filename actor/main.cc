@@ -88,10 +88,10 @@ int Main(int argc, char** argv) {
   const RunFolder run{flags.run_dir};
   const absl::StatusOr<std::string> replay =
       ChooseAddress(flags.replay, config->replay().address(), run.replay_address());
-  if (!replay.ok()) return Fail(replay.status(), 2);
+  if (!replay.ok()) return Fail(replay.status());
   const absl::StatusOr<std::string> learner =
       ChooseAddress(flags.learner, config->learner().address(), run.learner_address());
-  if (!learner.ok()) return Fail(learner.status(), 2);
+  if (!learner.ok()) return Fail(learner.status());
   const ActorOptions options = {.config = *config,
                                 .index = flags.index,
                                 .processes = flags.processes,

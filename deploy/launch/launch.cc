@@ -11,6 +11,7 @@
 #include "actor/evaluator.h"
 #include "core/file_io.h"
 #include "core/monotonic_clock.h"
+#include "core/safetensors.h"
 #include "core/status_macros.h"
 #include "deploy/launch/commit.h"
 #include "deploy/launch/health.h"
@@ -293,6 +294,9 @@ Launch::Stopped Launch::StopAll(bool ask) {
   if (ask && monitor_ != nullptr) watch_.Count(monitor_->Ask(kLastAnswerWithin));
   monitor_.reset();
   stopped.services_saved = supervisor_->Stop();
+  // The learner trained on between its last answer and its last save.
+  if (const auto policy = LoadPolicy(plan_.folder.latest_policy()); stopped.services_saved && policy.ok())
+    watch_.CountSaved(*policy);
   stopped.by_signal = supervisor_->stop_signals() > 0;
   supervisor_.reset();
   watch_.CountWallTime(MonotonicNow());

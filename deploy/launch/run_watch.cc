@@ -25,6 +25,11 @@ void RunWatch::Count(const RunSample& sample) {
   summary_.Update(sample);
 }
 
+void RunWatch::CountSaved(const PolicySnapshot& policy) {
+  summary_.updates = policy.updates;
+  summary_.policy_version = policy.version;
+}
+
 void RunWatch::Observe(const RunSample& sample, std::uint64_t restarts, absl::Time now) {
   if (!first_episodes_.has_value() && sample.replay.has_value()) first_episodes_ = sample.replay->episodes();
   const std::vector<EvaluationPoint> fresh = summary_.Update(sample);

@@ -8,6 +8,7 @@
 #include "absl/status/status.h"
 #include "absl/time/time.h"
 #include "actor/evaluator.h"
+#include "core/policy_snapshot.h"
 #include "deploy/launch/monitor.h"
 #include "deploy/launch/run_limits.h"
 #include "deploy/launch/run_summary.h"
@@ -30,6 +31,8 @@ class RunWatch {
 
   // Takes over what the services count.
   void Count(const RunSample& sample);
+  // Takes over what the learner has saved last.
+  void CountSaved(const PolicySnapshot& policy);
   // In training: counts, and notes the limit that the run has come to, if any, as its ending. `restarts`: of
   // processes, in this launch.
   void Observe(const RunSample& sample, std::uint64_t restarts, absl::Time now);

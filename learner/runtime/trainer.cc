@@ -15,6 +15,8 @@ namespace dbr {
 namespace {
 constexpr char kUpdates[] = "learner.updates";
 constexpr char kVersion[] = "learner.policy_version";
+// How far the learner is must be known also where it pushes seldom: the launcher waits for it.
+constexpr absl::Duration kStatusEvery = absl::Milliseconds(500);
 }  // namespace
 
 Trainer::Trainer(const LearnerConfig& config, TrainerParts parts)
@@ -84,6 +86,7 @@ absl::Status Trainer::Update(std::unique_ptr<DrawnBatches> drawn) {
   ++updates_;
   if (updates_ % config_.push_every() == 0) Publish();
   if (updates_ % config_.metrics_every() == 0) Record();
+  if (MonotonicNow() - last_status_ >= kStatusEvery) SetStatus(/*finished=*/false);
   MaybeCheckpoint();
   return absl::OkStatus();
 }
@@ -97,6 +100,7 @@ void Trainer::Publish() {
 }
 
 void Trainer::SetStatus(bool finished) {
+  last_status_ = MonotonicNow();
   LearnerStatus status;
   status.set_updates(updates_);
   status.set_policy_version(snapshot_.version);

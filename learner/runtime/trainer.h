@@ -80,6 +80,7 @@ class Trainer {
   double updates_per_second_ = 0;
   absl::Time last_record_;
   absl::Time last_checkpoint_;
+  absl::Time last_status_;
   absl::Mutex mutex_;
   bool stopping_ ABSL_GUARDED_BY(mutex_) = false;
 };

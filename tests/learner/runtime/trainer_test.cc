@@ -69,10 +69,11 @@ class TrainerTest : public testing::Test {
   std::unique_ptr<Trainer> MakeTrainer(std::uint64_t max_updates) {
     return MakeTrainer(max_updates, MakeAlgorithm(SmallSpec()).value());
   }
-  std::unique_ptr<Trainer> MakeTrainer(std::uint64_t max_updates, std::unique_ptr<Algorithm> algorithm) {
+  std::unique_ptr<Trainer> MakeTrainer(std::uint64_t max_updates, std::unique_ptr<Algorithm> algorithm,
+                                       std::uint32_t push_every = 10) {
     LearnerConfig config;
     config.set_max_updates(max_updates);
-    config.set_push_every(10);
+    config.set_push_every(push_every);
     config.set_metrics_every(10);
     TrainerParts parts{.algorithm = std::move(algorithm),
                        .policy_service = &service_,
@@ -225,6 +226,24 @@ TEST_F(TrainerTest, StopsWhileTheRateLimiterHoldsTheFirstDraw) {
   trainer->Stop();
   thread.join();
   EXPECT_EQ(trainer->updates(), 0u);
+}
+
+// The launcher starts the actors when it hears that the offline updates are made.
+TEST_F(TrainerTest, TellsHowFarItIsThoughItPushesSeldom) {
+  Insert(100);
+  const auto trainer =
+      MakeTrainer(/*max_updates=*/0, MakeAlgorithm(SmallSpec()).value(), /*push_every=*/1'000'000'000);
+  std::thread thread([&] { EXPECT_TRUE(trainer->Run().ok()); });
+  const LearnerStatusRequest request;
+  LearnerStatus status;
+  for (const absl::Time deadline = absl::Now() + absl::Seconds(60);
+       status.updates() == 0 && absl::Now() < deadline;) {
+    service_.Status(nullptr, &request, &status);
+    std::this_thread::yield();
+  }
+  EXPECT_GT(status.updates(), 0u);
+  trainer->Stop();
+  thread.join();
 }
 
 TEST_F(TrainerTest, SavesWhatIsSoundWhereTheReplayIsGoneForGood) {

@@ -9,6 +9,7 @@
 #include "core/file_io.h"
 #include "proto/health.grpc.pb.h"
 #include "proto/rpc/channel.h"
+#include "proto/rpc/deadline.h"
 #include "proto/rpc/server.h"
 #include "tests/support/temp_dir.h"
 
