@@ -1,6 +1,7 @@
 #include "replay/dataset/row_window.h"
 
 #include <algorithm>
+#include <initializer_list>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -15,17 +16,26 @@ constexpr int kMaxKeysInMessage = 12;
 constexpr char kEpisodeTerminals[] = "episode_terminals";
 constexpr absl::string_view kEndKeys[] = {"terminals", "timeouts", kEpisodeTerminals};
 
-absl::Status CheckKeys(const Hdf5File& file) {
-  RETURN_IF_ERROR(CheckEndKeys(file, "", kEndKeys));
-  if (file.Has("timeouts") && file.Has(kEpisodeTerminals)) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        file.path(), ": expected one of 'timeouts' and 'episode_terminals', found both; take the ",
-        "one out that does not hold"));
-  }
+std::vector<std::string> Missing(const Hdf5File& file, std::initializer_list<const char*> keys) {
   std::vector<std::string> missing;
-  for (const char* key : {"observations", "actions", "rewards", "terminals"}) {
+  for (const char* const key : keys) {
     if (!file.Has(key)) missing.push_back(absl::StrCat("'", key, "'"));
   }
+  return missing;
+}
+
+// Checks that the keys are those of a flat layout. Where other keys than those of the ends are missing the
+// file is of another layout altogether, which is to be said first.
+absl::Status CheckKeys(const Hdf5File& file) {
+  if (Missing(file, {"observations", "actions", "rewards"}).empty()) {
+    RETURN_IF_ERROR(CheckEndKeys(file, "", kEndKeys));
+    if (file.Has("timeouts") && file.Has(kEpisodeTerminals)) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          file.path(), ": expected one of 'timeouts' and 'episode_terminals', found both; take the ",
+          "one out that does not hold"));
+    }
+  }
+  const std::vector<std::string> missing = Missing(file, {"observations", "actions", "rewards", "terminals"});
   if (missing.empty()) return absl::OkStatus();
   std::vector<std::string> keys = file.Keys();
   if (keys.size() > kMaxKeysInMessage) {

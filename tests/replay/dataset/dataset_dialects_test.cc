@@ -107,6 +107,13 @@ TEST_F(DatasetDialectsTest, TheyAreRefusedByNameAlsoWhereTerminalsAreMissing) {
   EXPECT_THAT(ReadAll(path_, Options(DatasetLayout::kD4rl)).status().ToString(), HasSubstr("'dones'"));
 }
 
+TEST_F(DatasetDialectsTest, AFileOfAnotherLayoutAltogetherIsToldByItsMissingKeys) {
+  WriteRaw(path_, columns_, {"observations", "terminals", "timeouts"});
+  Add("step_type", columns_.terminals);
+  EXPECT_THAT(ReadAll(path_, Options(DatasetLayout::kD4rl)).status().ToString(),
+              AllOf(HasSubstr("expected key 'observations', 'terminals'"), HasSubstr("step_type")));
+}
+
 TEST_F(DatasetDialectsTest, AMinariEpisodeWithOtherFlagsIsRefusedByName) {
   WriteMinari(path_, episodes_);
   Add("episode_3/dones", {0, 1});
