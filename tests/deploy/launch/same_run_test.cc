@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "deploy/report/settings.h"
 #include "proto/config/config_file.h"
 
 namespace dbr {
@@ -64,7 +65,12 @@ void FindWithoutInfluence(const std::function<Message*(Config*)>& part, const st
     }
     Config other = plain;
     SetAnother(*field, part(&other));
-    if (DifferencesOfOutcome(plain, other).empty()) found->push_back(name);
+    const bool same = DifferencesOfOutcome(plain, other).empty();  // as dbr experiment asks
+    if (same) found->push_back(name);
+    // As dbr report asks, which leaves the seed out, for it averages over seeds.
+    const report::Settings settings = report::SettingsOf(other), plain_settings = report::SettingsOf(plain);
+    EXPECT_EQ(settings.digest == plain_settings.digest, same || name == "seed") << name;
+    EXPECT_EQ(settings.differences == plain_settings.differences, same || name == "seed") << name;
   }
 }
 
@@ -83,6 +89,7 @@ TEST(OutcomeTest, AConfigIsComparedAsItTakesEffect) {
   EXPECT_EQ(DifferencesOfOutcome(Config(), written), "");
   EXPECT_TRUE(
       google::protobuf::util::MessageDifferencer::Equals(OutcomeConfig(Config()), WithDefaults(written)));
+  EXPECT_EQ(report::SettingsOf(Config()).digest, report::SettingsOf(written).digest);
   written.mutable_algorithm()->mutable_dbr()->set_epsilon(0.1);
   EXPECT_THAT(DifferencesOfOutcome(Config(), written), HasSubstr("algorithm.dbr.epsilon: 0.05 -> 0.1"));
 }
@@ -92,6 +99,7 @@ TEST(OutcomeTest, OfTheSeedBufferTheFilesNameCounts) {
   here.mutable_replay()->mutable_seed_buffer()->set_path("/here/hopper.hdf5");
   there.mutable_replay()->mutable_seed_buffer()->set_path("there/hopper.hdf5");
   EXPECT_EQ(DifferencesOfOutcome(here, there), "");
+  EXPECT_EQ(report::SettingsOf(here).digest, report::SettingsOf(there).digest);
   there.mutable_replay()->mutable_seed_buffer()->set_path("/here/walker.hdf5");
   EXPECT_THAT(DifferencesOfOutcome(here, there), HasSubstr("\"hopper.hdf5\" -> \"walker.hdf5\""));
 }
