@@ -38,6 +38,10 @@ std::string Scores(const Progress& progress, bool words) {
     parts.push_back(
         absl::StrCat(words ? opponent.name : opponent.short_name, " ", Score(sample, opponent.name, words)));
   }
+  if (!parts.empty()) return absl::StrJoin(parts, " ");
+  // The config leaves out all that are watched: those that it has are shown.
+  for (const EvaluationReport& report : sample.learner->evaluations())
+    parts.push_back(absl::StrCat(report.opponent(), " ", Score(sample, report.opponent(), words)));
   return absl::StrJoin(parts, " ");
 }
 
