@@ -2,16 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace dbr {
+
+EvaluationCurve::EvaluationCurve(std::vector<EvaluationPoint> earlier, std::set<std::uint64_t> skipped)
+    : points_(std::move(earlier)), skipped_(std::move(skipped)) {
+  for (const EvaluationPoint& point : points_)
+    known_.emplace(point.policy_version, point.updates, point.opponent);
+}
 
 std::vector<EvaluationPoint> EvaluationCurve::Update(const RunSample& sample) {
   Remember(sample);
   std::vector<EvaluationPoint> fresh;
-  if (!sample.learner.has_value()) return fresh;
-  skipped_.insert(sample.learner->skipped_iterations().begin(), sample.learner->skipped_iterations().end());
-  for (const EvaluationReport& report : sample.learner->evaluations()) {
-    if (Knows(report)) continue;
+  for (const EvaluationReport& report : sample.reports) {
+    skipped_.insert(report.skipped_iterations().begin(), report.skipped_iterations().end());
+    if (!known_.emplace(report.policy_version(), report.updates(), report.opponent()).second) continue;
     fresh.push_back({.opponent = report.opponent(),
                      .policy_version = report.policy_version(),
                      .updates = report.updates(),
@@ -48,12 +54,6 @@ std::uint64_t EvaluationCurve::StepsAt(std::uint64_t updates) const {
   const double share =
       static_cast<double>(updates - before.updates) / static_cast<double>(after->updates - before.updates);
   return before.steps + static_cast<std::uint64_t>(share * static_cast<double>(after->steps - before.steps));
-}
-
-bool EvaluationCurve::Knows(const EvaluationReport& report) const {
-  return std::any_of(points_.rbegin(), points_.rend(), [&report](const EvaluationPoint& point) {
-    return point.policy_version == report.policy_version() && point.opponent == report.opponent();
-  });
 }
 
 std::optional<std::uint64_t> EvaluationCurve::LastIteration() const {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <utility>
+#include <tuple>
 #include <vector>
 
 #include "deploy/launch/monitor.h"
@@ -27,14 +27,15 @@ struct EvaluationPoint {
   std::optional<std::uint64_t> iteration = std::nullopt;  // only in a run that is evaluated by updates
 };
 
-// Collects evaluations from the answers of the services, each once. A copyable value. One thread.
+// Collects evaluations from the answers of the services, each once: of one policy (its version and its
+// updates, for a version may come again after the learner's death) against one opponent there is one. A
+// copyable value. One thread.
 class EvaluationCurve {
  public:
   EvaluationCurve() = default;
-  explicit EvaluationCurve(std::vector<EvaluationPoint> earlier, std::set<std::uint64_t> skipped = {})
-      : points_(std::move(earlier)), skipped_(std::move(skipped)) {}
+  explicit EvaluationCurve(std::vector<EvaluationPoint> earlier, std::set<std::uint64_t> skipped = {});
 
-  // Takes the evaluations that it does not know yet, and returns them.
+  // Takes the evaluations that it does not know yet, and returns them in their order.
   std::vector<EvaluationPoint> Update(const RunSample& sample);
 
   const std::vector<EvaluationPoint>& points() const { return points_; }
@@ -62,9 +63,12 @@ class EvaluationCurve {
   // The actors' transitions when that many updates were made, on a straight line between the two moments
   // around it.
   std::uint64_t StepsAt(std::uint64_t updates) const;
-  bool Knows(const EvaluationReport& report) const;
+
+  // Of a policy its version and its updates, and the opponent.
+  using Key = std::tuple<std::uint64_t, std::uint64_t, std::string>;
 
   std::vector<EvaluationPoint> points_;
+  std::set<Key> known_;  // of points_
   std::set<std::uint64_t> skipped_;
   std::deque<Moment> moments_;  // ascending
 };

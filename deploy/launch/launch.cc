@@ -246,9 +246,9 @@ absl::Status Launch::WaitUntilServing(const std::string& name, const std::string
 absl::Status Launch::Train() {
   while (supervisor_->stop_signals() == 0) {
     const absl::Time now = MonotonicNow();
-    const RunSample sample = monitor_->Latest();
-    RETURN_IF_ERROR(sample.refusal);
+    const RunSample sample = monitor_->Take();
     Observe(sample, now);
+    RETURN_IF_ERROR(sample.refusal);
     RETURN_IF_ERROR(SaveIfDue(now));
     if (summary().ended != RunEnding::kRunning) return absl::OkStatus();
     if (!acting_ && watch_.limits().OfflinePhaseIsOver(sample)) {

@@ -39,27 +39,44 @@ RunMonitor::~RunMonitor() {
   thread_.join();
 }
 
-RunSample RunMonitor::Latest() const {
+RunSample RunMonitor::Take() {
   absl::MutexLock lock(&mutex_);
-  return latest_;
+  RunSample sample = latest_;
+  sample.reports = feed_.Take();
+  sample.missed_reports = feed_.missed();
+  return sample;
 }
 
 RunSample RunMonitor::Ask(absl::Duration timeout) {
+  AskBoth(timeout).IgnoreError();  // the sample holds it
+  return Take();
+}
+
+absl::Status RunMonitor::AskBoth(absl::Duration timeout) {
+  LearnerStatusRequest have;
+  {
+    absl::MutexLock lock(&mutex_);
+    have = feed_.have();
+  }
   const absl::StatusOr<StatsReply> stats = replay_.Stats(timeout);
-  const absl::StatusOr<LearnerStatus> status = learner_.Status(timeout);
+  absl::StatusOr<LearnerStatus> status = learner_.Status(timeout, have);
   absl::MutexLock lock(&mutex_);
   NoteRefusal(replay_address_, stats.status(), &latest_.refusal);
   NoteRefusal(learner_address_, status.status(), &latest_.refusal);
   latest_.replay_away = !stats.ok();
   if (stats.ok()) latest_.replay = *stats;
   latest_.learner_away = !status.ok();
-  if (status.ok()) latest_.learner = *status;
-  return latest_;
+  if (status.ok()) {
+    feed_.Read(*status);
+    status->clear_reports();
+    latest_.learner = *std::move(status);
+  }
+  return latest_.refusal;
 }
 
 void RunMonitor::Run() {
   for (;;) {
-    const bool refused = !Ask(kCallTimeout).refusal.ok();
+    const bool refused = !AskBoth(kCallTimeout).ok();
     on_sample_();
     if (refused) return;
     absl::MutexLock lock(&mutex_);

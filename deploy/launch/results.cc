@@ -118,6 +118,7 @@ absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder) {
                    {"evaluations", evaluations},
                    {"skipped_iterations", summary.SkippedIterations()},
                    {"final", final_results}});
+  if (summary.missed_evaluations > 0) json["missed_evaluations"] = summary.missed_evaluations;
   // Paths and logs may hold bytes that are not UTF-8.
   const std::string text = json.dump(2, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace);
   return WriteFileAtomically(folder.summary(), absl::StrCat(text, "\n"));

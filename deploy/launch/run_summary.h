@@ -48,9 +48,10 @@ struct RunSummary {
   std::uint64_t policy_version = 0;
   std::uint64_t restarts = 0;  // after a process died
   SeedBufferSummary seed_buffer;
-  std::uint64_t offline_updates = 0;  // as the config asks
-  EvaluationCurve curve;              // during training
-  std::uint64_t every_updates = 0;    // between evaluations, as the config asks; 0: by time
+  std::uint64_t offline_updates = 0;     // as the config asks
+  EvaluationCurve curve;                 // during training
+  std::uint64_t missed_evaluations = 0;  // that the learner dropped before the launcher asked for them
+  std::uint64_t every_updates = 0;       // between evaluations, as the config asks; 0: by time
   std::vector<EvaluationResult> final_results;
 
   // Takes over the counters of the newest answers, and returns the evaluations that are new.

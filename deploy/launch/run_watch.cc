@@ -22,7 +22,9 @@ void RunWatch::StartTraining(absl::Time now) {
 }
 
 void RunWatch::Count(const RunSample& sample) {
-  summary_.Update(sample);
+  const std::vector<EvaluationPoint> fresh = summary_.Update(sample);
+  summary_.missed_evaluations = before_.missed_evaluations + sample.missed_reports;
+  unseen_.insert(unseen_.end(), fresh.begin(), fresh.end());
 }
 
 void RunWatch::CountSaved(const PolicySnapshot& policy) {
@@ -32,7 +34,8 @@ void RunWatch::CountSaved(const PolicySnapshot& policy) {
 
 void RunWatch::Observe(const RunSample& sample, std::uint64_t restarts, absl::Time now) {
   if (!first_episodes_.has_value() && sample.replay.has_value()) first_episodes_ = sample.replay->episodes();
-  const std::vector<EvaluationPoint> fresh = summary_.Update(sample);
+  Count(sample);
+  const std::vector<EvaluationPoint> fresh = std::exchange(unseen_, {});
   summary_.training_s = before_.training_s + absl::ToDoubleSeconds(now - training_since_);
   summary_.restarts = before_.restarts + restarts;
   const bool finished = sample.learner.has_value() && sample.learner->finished();

@@ -29,7 +29,7 @@ class RunWatch {
   void Start(absl::Time now);          // the processes start
   void StartTraining(absl::Time now);  // all of them serve
 
-  // Takes over what the services count.
+  // Takes over what the services count. The next Observe looks at its evaluations.
   void Count(const RunSample& sample);
   // Takes over what the learner has saved last.
   void CountSaved(const PolicySnapshot& policy);
@@ -53,6 +53,7 @@ class RunWatch {
   const RunLimits limits_;
   const RunSummary before_;  // this launch
   RunSummary summary_;
+  std::vector<EvaluationPoint> unseen_;  // evaluations that no limit has been looked up for
   absl::Time started_ = absl::InfiniteFuture();
   absl::Time training_since_ = absl::InfiniteFuture();
   absl::Time saved_ = absl::InfinitePast();

@@ -123,6 +123,7 @@ void ReadCounters(const Json& json, RunSummary* summary) {
   summary->updates = Count(json, "updates");
   summary->policy_version = Count(json, "policy_version");
   summary->restarts = Count(json, "restarts");
+  summary->missed_evaluations = Count(json, "missed_evaluations");
 }
 
 }  // namespace

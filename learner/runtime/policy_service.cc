@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 #include <utility>
 
 #include "absl/cleanup/cleanup.h"
@@ -14,12 +15,15 @@
 
 namespace dbr {
 namespace {
-// How often a subscription without news looks whether its reader is still there.
-constexpr absl::Duration kLivenessCheck = absl::Seconds(1);
+std::uint64_t DrawLife() {
+  std::random_device device;
+  return (std::uint64_t{device()} << 32 | device()) | 1;  // never 0
+}
 }  // namespace
 
-PolicyService::PolicyService(std::function<void(const EvaluationReport&)> on_evaluation)
-    : on_evaluation_(std::move(on_evaluation)) {}
+PolicyService::PolicyService(std::function<void(const EvaluationReport&)> on_evaluation,
+                             absl::Duration look_for_reader)
+    : on_evaluation_(std::move(on_evaluation)), look_for_reader_(look_for_reader), life_(DrawLife()) {}
 
 void PolicyService::Publish(const PolicySnapshot& snapshot) {
   auto message = std::make_shared<PolicyMessage>(Encode(snapshot));
@@ -63,7 +67,7 @@ grpc::Status PolicyService::Subscribe(grpc::ServerContext* context, const Subscr
     sent_versions_.erase(subscription);
   };
   for (;;) {
-    const std::shared_ptr<const PolicyMessage> message = WaitForOther(have, kLivenessCheck);
+    const std::shared_ptr<const PolicyMessage> message = WaitForOther(have, look_for_reader_);
     if (context->IsCancelled()) return grpc::Status::CANCELLED;
     absl::ReleasableMutexLock lock(&mutex_);
     if (closed_) return grpc::Status(grpc::StatusCode::UNAVAILABLE, "the learner is stopping");
@@ -76,12 +80,21 @@ grpc::Status PolicyService::Subscribe(grpc::ServerContext* context, const Subscr
   }
 }
 
-grpc::Status PolicyService::Status(grpc::ServerContext*, const LearnerStatusRequest*, LearnerStatus* reply) {
+void PolicyService::AddReports(const LearnerStatusRequest& have, LearnerStatus* reply) const {
+  reply->set_life(life_);
+  reply->set_newest_report(newest_report_);
+  const std::uint64_t has = have.life() == life_ ? std::min(have.newest_report(), newest_report_) : 0;
+  const std::size_t missing = std::min<std::uint64_t>(newest_report_ - has, reports_.size());
+  reply->mutable_reports()->Assign(reports_.end() - static_cast<std::ptrdiff_t>(missing), reports_.end());
+}
+
+grpc::Status PolicyService::Status(grpc::ServerContext*, const LearnerStatusRequest* request,
+                                   LearnerStatus* reply) {
   absl::MutexLock lock(&mutex_);
   *reply = status_;
   reply->set_protocol_version(kProtocolVersion);
   for (const auto& [opponent, report] : evaluations_) *reply->add_evaluations() = report;
-  reply->mutable_skipped_iterations()->Assign(skipped_iterations_.begin(), skipped_iterations_.end());
+  AddReports(*request, reply);
   reply->set_subscribers(static_cast<std::uint32_t>(sent_versions_.size()));
   std::uint64_t oldest = reply->policy_version();
   for (const auto& [subscription, version] : sent_versions_) oldest = std::min(oldest, version);
@@ -98,7 +111,9 @@ grpc::Status PolicyService::ReportEvaluation(grpc::ServerContext*, const Evaluat
   {
     absl::MutexLock lock(&mutex_);
     evaluations_[report->opponent()] = *report;
-    skipped_iterations_.insert(report->skipped_iterations().begin(), report->skipped_iterations().end());
+    reports_.push_back(*report);
+    if (reports_.size() > kMaxReports) reports_.pop_front();
+    ++newest_report_;
   }
   on_evaluation_(*report);
   return grpc::Status::OK;

@@ -24,11 +24,12 @@ class LearnerClient::Impl {
 LearnerClient::LearnerClient(const std::string& address) : impl_(std::make_unique<Impl>(address)) {}
 LearnerClient::~LearnerClient() = default;
 
-absl::StatusOr<LearnerStatus> LearnerClient::Status(absl::Duration timeout) {
+absl::StatusOr<LearnerStatus> LearnerClient::Status(absl::Duration timeout,
+                                                    const LearnerStatusRequest& have) {
   grpc::ClientContext context;
   SetDeadline(timeout, &context);
   LearnerStatus reply;
-  RETURN_IF_ERROR(FromGrpc(impl_->stub().Status(&context, {}, &reply)));
+  RETURN_IF_ERROR(FromGrpc(impl_->stub().Status(&context, have, &reply)));
   RETURN_IF_ERROR(CheckProtocolVersion(reply.protocol_version(), "the learner", "this program"));
   return reply;
 }

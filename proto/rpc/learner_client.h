@@ -23,8 +23,10 @@ class LearnerClient {
   LearnerClient(const LearnerClient&) = delete;
   LearnerClient& operator=(const LearnerClient&) = delete;
 
-  // FailedPrecondition where the learner speaks another protocol version (proto/rpc/protocol.h).
-  absl::StatusOr<LearnerStatus> Status(absl::Duration timeout);
+  // The state of training, with the evaluators' reports that come after those that the caller has
+  // (proto/policy.proto; by default it has none). FailedPrecondition where the learner speaks another
+  // protocol version (proto/rpc/protocol.h).
+  absl::StatusOr<LearnerStatus> Status(absl::Duration timeout, const LearnerStatusRequest& have = {});
   // Hands over the result of an evaluation. InvalidArgument for a report without episodes or without a finite
   // mean return.
   absl::Status ReportEvaluation(const EvaluationReport& report, absl::Duration timeout);

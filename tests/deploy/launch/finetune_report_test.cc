@@ -44,7 +44,7 @@ RunSample Sample(std::uint64_t updates, std::uint64_t steps) {
 }
 
 RunSample Evaluated(RunSample sample, std::uint64_t version, std::uint64_t updates, double mean) {
-  EvaluationReport* report = sample.learner->add_evaluations();
+  EvaluationReport* report = &sample.reports.emplace_back();
   report->set_policy_version(version);
   report->set_updates(updates);
   report->set_episodes(4);
@@ -52,6 +52,8 @@ RunSample Evaluated(RunSample sample, std::uint64_t version, std::uint64_t updat
   report->set_return_stderr(10);
   report->set_score_mean(kNaN);
   report->set_score_stderr(kNaN);
+  sample.learner->clear_evaluations();
+  *sample.learner->add_evaluations() = *report;  // the newest
   return sample;
 }
 
@@ -65,6 +67,24 @@ TEST(EvaluationCurveTest, TakesEachEvaluationOnce) {
   EXPECT_EQ(curve.points()[1].updates, 350u);
   EXPECT_EQ(curve.points()[1].return_mean, 600);
   EXPECT_EQ(curve.points()[1].return_std, 20);  // of 4 episodes with a standard error of 10
+}
+
+TEST(EvaluationCurveTest, TakesAllEvaluationsOfASampleInTheirOrder) {
+  EvaluationCurve curve;
+  RunSample sample = Sample(500, 0);
+  for (const int version : {1, 2, 3}) sample = Evaluated(sample, version, 100 * version, 10 * version);
+  sample = Evaluated(sample, 2, 200, 20);  // an evaluator whose call was answered too late sends it again
+  ASSERT_THAT(curve.Update(sample), SizeIs(3));
+  for (const std::size_t i : {0, 1, 2}) EXPECT_EQ(curve.points()[i].policy_version, i + 1);
+}
+
+TEST(EvaluationCurveTest, KnowsThoseOfAnEarlierLaunchAndTellsAVersionThatComesAgainFromThem) {
+  EvaluationCurve earlier;
+  earlier.Update(Evaluated(Sample(300, 0), 2, 100, 500));
+  EvaluationCurve curve(earlier.points());
+  EXPECT_THAT(curve.Update(Evaluated(Sample(300, 0), 2, 100, 500)), IsEmpty());
+  EXPECT_THAT(curve.Update(Evaluated(Sample(300, 0), 2, 150, 510)), SizeIs(1))
+      << "a learner that was killed had pushed version 2 elsewhere";
 }
 
 TEST(EvaluationCurveTest, KnowsWhatActorsHadDoneWhenAPolicyWasMade) {

@@ -153,6 +153,17 @@ TEST(ProgressTest, ShowsTheWatchedOpponentsThatAreEvaluated) {
   EXPECT_THAT(ProgressText(progress, 200), AllOf(HasSubstr("random 0.93"), Not(HasSubstr("mcts:10"))));
 }
 
+TEST(ProgressTest, ShowsWhatIsEvaluatedWhereNoneOfItIsWatched) {
+  Progress progress = OfConnect4();
+  progress.sample.replay = SomeStats();
+  progress.sample.learner = SomeStatus();
+  progress.left = absl::Seconds(125);
+  progress.sample.learner->mutable_evaluations(0)->set_opponent("one_ply");
+  const std::string line = ProgressText(progress, 200);
+  EXPECT_THAT(line, HasSubstr("(lag 2) · one_ply 0.93 · 2:05 left"));
+  EXPECT_THAT(ProgressText(progress, 79), AllOf(HasSubstr("one_ply .93"), Not(HasSubstr("  "))));
+}
+
 TEST(ProgressTest, SaysThatAServiceIsAway) {
   Progress progress = OfConnect4();
   progress.sample.replay = SomeStats();
@@ -249,7 +260,9 @@ TEST(ResultsTest, SummaryKeepsItsCountersOverAResume) {
   RunSample sample;
   sample.replay = SomeStats();
   sample.learner = SomeStatus();
+  sample.reports = {sample.learner->evaluations(0)};
   summary.Update(sample);
+  summary.missed_evaluations = 7;
   summary.ended = RunEnding::kInterrupted;
   summary.config = "bad \xff byte";
   summary.commit = "abc+changes";
@@ -266,6 +279,7 @@ TEST(ResultsTest, SummaryKeepsItsCountersOverAResume) {
   EXPECT_EQ(read.training_s, 12.5);
   EXPECT_EQ(read.launches, 2);
   EXPECT_EQ(read.transitions, 123456);
+  EXPECT_EQ(read.missed_evaluations, 7);
   EXPECT_EQ(read.ended, RunEnding::kInterrupted);
   EXPECT_EQ(read.commit, "abc+changes");
   ASSERT_EQ(read.final_results.size(), 1);
@@ -281,9 +295,11 @@ TEST(ResultsTest, SummaryNamesTheIterationsThatWereNotEvaluated) {
   RunSample sample;
   sample.learner = SomeStatus();
   sample.learner->set_updates(9500);
-  sample.learner->mutable_evaluations(0)->set_iteration(5);
-  sample.learner->add_skipped_iterations(2);
-  sample.learner->add_skipped_iterations(4);
+  EvaluationReport report = sample.learner->evaluations(0);
+  report.set_iteration(5);
+  report.add_skipped_iterations(2);
+  report.add_skipped_iterations(4);
+  sample.reports = {report};
   summary.Update(sample);
   const auto written = [&] {
     EXPECT_TRUE(WriteSummary(summary, run).ok());

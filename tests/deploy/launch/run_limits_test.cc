@@ -155,6 +155,51 @@ TEST(RunWatchTest, EpisodesAreForeseenByTheRateOfThisLaunch) {
   EXPECT_THAT(watch.TimeLeft(Counted(40, 0)), Optional(absl::Seconds(5))) << "20 in 10 s, and 10 to come";
 }
 
+EvaluationReport Returning(std::uint64_t version, double mean) {
+  EvaluationReport report;
+  report.set_policy_version(version);
+  report.set_episodes(10);
+  report.set_return_mean(mean);
+  return report;
+}
+
+TEST(RunWatchTest, NoEvaluationThatReachesTheReturnIsPassedOver) {
+  Config config;
+  config.mutable_launch()->set_stop_at_return(100);
+  const absl::Time start = absl::FromUnixSeconds(1000);
+  for (const std::size_t place : {0, 1, 2}) {
+    RunWatch watch(config, SecondLaunch());
+    watch.Start(start);
+    watch.StartTraining(start);
+    RunSample sample = Counted(10, 200);
+    for (const std::size_t i : {0, 1, 2}) sample.reports.push_back(Returning(i, i == place ? 100 : 50));
+    watch.Observe(sample, 0, start);
+    EXPECT_EQ(watch.summary().ended, RunEnding::kStopAtReturn) << place;
+  }
+  RunWatch watch(config, SecondLaunch());
+  watch.Start(start);
+  watch.StartTraining(start);
+  RunSample early = Counted(10, 200);
+  early.reports = {Returning(1, 120)};
+  watch.Count(early);  // before training is looked at
+  watch.Observe(Counted(10, 200), 0, start);
+  EXPECT_EQ(watch.summary().ended, RunEnding::kStopAtReturn);
+}
+
+TEST(RunWatchTest, CountsTheEvaluationsThatItMissedOverAllLaunches) {
+  const absl::Time start = absl::FromUnixSeconds(1000);
+  RunSummary before = SecondLaunch();
+  before.missed_evaluations = 5;
+  RunWatch watch{Config(), before};
+  watch.Start(start);
+  watch.StartTraining(start);
+  RunSample sample = Counted(10, 200);
+  sample.missed_reports = 3;  // in this launch
+  watch.Observe(sample, 0, start);
+  watch.Observe(sample, 0, start);
+  EXPECT_EQ(watch.summary().missed_evaluations, 8u);
+}
+
 TEST(RunWatchTest, IsDueToBeSavedOnceInTenSeconds) {
   const absl::Time now = absl::FromUnixSeconds(1000);
   RunWatch watch{Config(), RunSummary()};

@@ -33,7 +33,9 @@ SubscribeRequest Opening(std::uint32_t protocol_version = kProtocolVersion) {
 
 class PolicyServiceTest : public testing::Test {
  protected:
-  PolicyServiceTest() : service_([this](const EvaluationReport& report) { reports_.push_back(report); }) {
+  // No subscription looks for its reader within a test: what wakes it is what the test does.
+  PolicyServiceTest()
+      : service_([this](const EvaluationReport& report) { reports_.push_back(report); }, absl::Minutes(1)) {
     auto running = StartServer({"unix:" + folder_.path() + "/learner.sock"}, {&service_});
     EXPECT_TRUE(running.ok()) << running.status();
     running_ = std::move(running).value();
@@ -129,13 +131,14 @@ TEST_F(PolicyServiceTest, StatusSaysTheProtocolAndAClientRefusesAnother) {
   EXPECT_THAT(std::string(refused.message()), testing::HasSubstr("the learner is older than this program"));
 }
 
-TEST_F(PolicyServiceTest, CloseEndsSubscriptions) {
+TEST_F(PolicyServiceTest, CloseWakesAndEndsSubscriptions) {
   service_.Publish(Snapshot(1));
   const auto reader = stub_->Subscribe(&context_, Opening());
   PolicyMessage message;
   ASSERT_TRUE(reader->Read(&message));
   service_.Close();
   EXPECT_FALSE(reader->Read(&message));
+  // Without the wake-up the call's deadline ends it.
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
 }
 
@@ -157,20 +160,71 @@ TEST_F(PolicyServiceTest, KeepsTheNewestEvaluationOfEachOpponent) {
   EXPECT_EQ(reports_.size(), 2u);
 }
 
-TEST_F(PolicyServiceTest, KeepsWhatEvaluatorsSkipped) {
-  for (const std::vector<std::uint64_t>& skipped : {std::vector<std::uint64_t>{5, 6}, {5, 6}, {}, {2}}) {
-    EvaluationReport report;
-    report.set_episodes(10);
-    report.mutable_skipped_iterations()->Assign(skipped.begin(), skipped.end());
-    grpc::ClientContext context;
+EvaluationReport Report(const std::string& opponent, std::uint64_t version) {
+  EvaluationReport report;
+  report.set_opponent(opponent);
+  report.set_policy_version(version);
+  report.set_episodes(10);
+  return report;
+}
+
+// The policy versions of the reports in an answer.
+std::vector<std::uint64_t> VersionsIn(const LearnerStatus& status) {
+  std::vector<std::uint64_t> versions;
+  for (const EvaluationReport& report : status.reports()) versions.push_back(report.policy_version());
+  return versions;
+}
+
+TEST_F(PolicyServiceTest, DeliversEveryReportInOrderAfterTheOneThatTheCallerHas) {
+  const auto hand_in = [this](const EvaluationReport& report) {
     EvaluationReportReply reply;
-    ASSERT_TRUE(stub_->ReportEvaluation(&context, report, &reply).ok());
+    ASSERT_TRUE(service_.ReportEvaluation(nullptr, &report, &reply).ok());
+  };
+  const auto ask = [this](std::uint64_t life, std::uint64_t newest) {
+    LearnerClient client(running_.address);
+    LearnerStatusRequest have;
+    have.set_life(life);
+    have.set_newest_report(newest);
+    const auto status = client.Status(absl::Seconds(20), have);
+    EXPECT_TRUE(status.ok()) << status.status();
+    return *status;
+  };
+  EXPECT_THAT(VersionsIn(ask(0, 0)), testing::IsEmpty());
+  // Both opponents of two policies between two questions: the newest of each opponent would be half of them.
+  EvaluationReport skipping = Report("random", 2);
+  skipping.add_skipped_iterations(5);
+  for (const EvaluationReport& report :
+       {Report("random", 1), Report("mcts:10", 1), skipping, Report("mcts:10", 2)}) {
+    hand_in(report);
   }
-  service_.SetStatus(LearnerStatus());
-  grpc::ClientContext context;
+  const LearnerStatus first = ask(0, 0);
+  EXPECT_THAT(VersionsIn(first), testing::ElementsAre(1, 1, 2, 2));
+  EXPECT_EQ(first.newest_report(), 4u);
+  EXPECT_NE(first.life(), 0u);
+  EXPECT_THAT(first.reports(2).skipped_iterations(), testing::ElementsAre(5));
+  EXPECT_THAT(VersionsIn(ask(first.life(), 4)), testing::IsEmpty());
+  hand_in(Report("random", 3));
+  EXPECT_THAT(VersionsIn(ask(first.life(), 4)), testing::ElementsAre(3));
+  EXPECT_THAT(VersionsIn(ask(first.life(), 4)), testing::ElementsAre(3)) << "an answer may have been lost";
+  EXPECT_THAT(VersionsIn(ask(first.life(), 1000)), testing::IsEmpty());
+  EXPECT_THAT(VersionsIn(ask(first.life() + 2, 4)), testing::ElementsAre(1, 1, 2, 2, 3))
+      << "the numbers of another life mean nothing here";
+  EXPECT_NE(PolicyService([](const EvaluationReport&) {}).life(), first.life());
+}
+
+TEST_F(PolicyServiceTest, HoldsSoManyReportsAndSaysHowManyThereWere) {
+  constexpr std::size_t kMore = 10;
+  EvaluationReportReply reply;
+  for (std::size_t i = 1; i <= PolicyService::kMaxReports + kMore; ++i) {
+    const EvaluationReport report = Report("random", i);
+    ASSERT_TRUE(service_.ReportEvaluation(nullptr, &report, &reply).ok());
+  }
+  LearnerStatusRequest request;
   LearnerStatus status;
-  ASSERT_TRUE(stub_->Status(&context, LearnerStatusRequest(), &status).ok());
-  EXPECT_THAT(status.skipped_iterations(), testing::ElementsAre(2, 5, 6));
+  ASSERT_TRUE(service_.Status(nullptr, &request, &status).ok());
+  EXPECT_EQ(status.newest_report(), PolicyService::kMaxReports + kMore);
+  ASSERT_EQ(status.reports_size(), static_cast<int>(PolicyService::kMaxReports));
+  EXPECT_EQ(status.reports(0).policy_version(), kMore + 1);
 }
 
 TEST_F(PolicyServiceTest, RefusesAnEvaluationWithoutEpisodes) {
