@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
+#include <memory>
 #include <utility>
 
 #include "absl/cleanup/cleanup.h"
@@ -16,6 +17,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/shutdown.h"
 #include "core/status_macros.h"
+#include "core/temporary_file.h"
 
 namespace dbr {
 namespace {
@@ -23,20 +25,13 @@ namespace {
 constexpr std::size_t kMaxFileBytes = std::size_t{4} << 30;
 constexpr std::size_t kMaxTextBytes = std::size_t{16} << 20;
 
-std::string FolderOf(const std::string& path) {
-  const auto slash = path.rfind('/');
-  if (slash == std::string::npos) return ".";
-  return slash == 0 ? "/" : path.substr(0, slash);
-}
-
-absl::Status WriteAndSync(int fd, absl::string_view contents, const std::string& path) {
+absl::Status WriteAll(int fd, absl::string_view contents, const std::string& path) {
   while (!contents.empty()) {
     const ssize_t n = write(fd, contents.data(), contents.size());
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) return ErrnoStatus(errno, "cannot write", path);
     contents.remove_prefix(static_cast<std::size_t>(n));
   }
-  if (fsync(fd) != 0) return ErrnoStatus(errno, "cannot flush", path);
   return absl::OkStatus();
 }
 
@@ -110,26 +105,9 @@ absl::Status ErrnoStatus(int error_number, absl::string_view what, absl::string_
 }
 
 absl::Status WriteFileAtomically(const std::string& path, absl::string_view contents) {
-  const std::string temporary = absl::StrCat(path, ".tmp.", getpid());
-  const int fd = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (fd < 0) return ErrnoStatus(errno, "cannot create", temporary);
-  const absl::Status written = WriteAndSync(fd, contents, path);
-  close(fd);
-  if (!written.ok()) {
-    unlink(temporary.c_str());
-    return written;
-  }
-  if (rename(temporary.c_str(), path.c_str()) != 0) {
-    const int error_number = errno;
-    unlink(temporary.c_str());
-    return ErrnoStatus(error_number, "cannot rename to", path);
-  }
-  const int folder = open(FolderOf(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (folder >= 0) {
-    fsync(folder);
-    close(folder);
-  }
-  return absl::OkStatus();
+  ASSIGN_OR_RETURN(const std::unique_ptr<TemporaryFile> file, TemporaryFile::Create(path));
+  RETURN_IF_ERROR(WriteAll(file->fd(), contents, path));
+  return file->Commit();
 }
 
 absl::Status CheckRegularFile(int fd, absl::string_view path) {

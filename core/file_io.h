@@ -9,8 +9,9 @@
 
 namespace dbr {
 
-// Replaces `path` by `contents`: writes a temporary file beside it, calls fsync, renames it and calls fsync
-// on the folder. After a crash the old or the new contents stand there, never a mixture. Blocks. Errors name
+// Replaces `path` by `contents`: writes a temporary file beside it (core/temporary_file.h), calls fsync,
+// renames it and calls fsync on the folder. After a crash the old or the new contents stand there, never a
+// mixture; what a killed process left beside is removed by the next write in the folder. Blocks. Errors name
 // the path and the system's reason (ResourceExhausted: disk full; PermissionDenied; NotFound: no such folder;
 // Internal: others).
 absl::Status WriteFileAtomically(const std::string& path, absl::string_view contents);

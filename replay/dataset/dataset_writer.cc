@@ -1,15 +1,11 @@
 #include "replay/dataset/dataset_writer.h"
 
-#include <fcntl.h>
 #include <hdf5.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstdint>
-#include <cstdio>
-#include <filesystem>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -17,8 +13,8 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "core/check.h"
-#include "core/file_io.h"
 #include "core/status_macros.h"
+#include "core/temporary_file.h"
 #include "replay/dataset/hdf5_id.h"
 
 namespace dbr {
@@ -109,28 +105,12 @@ bool WriteNumber(hid_t file, const char* name, std::int64_t number) {
   return attribute.ok() && H5Awrite(attribute.get(), H5T_NATIVE_INT64, &number) >= 0;
 }
 
-absl::Status SyncAndRename(const std::string& from, const std::string& to) {
-  const int fd = open(from.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) return ErrnoStatus(errno, "cannot open", from);
-  const int synced = fsync(fd) == 0 ? 0 : errno;
-  close(fd);
-  if (synced != 0) return ErrnoStatus(synced, "cannot write", from);
-  if (std::rename(from.c_str(), to.c_str()) != 0) return ErrnoStatus(errno, "cannot rename", from);
-  const std::string folder = std::filesystem::path(to).parent_path().string();
-  const int folder_fd = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (folder_fd < 0) return absl::OkStatus();
-  fsync(folder_fd);
-  close(folder_fd);
-  return absl::OkStatus();
-}
-
 }  // namespace
 
 struct DatasetWriter::State {
   ~State() {
     if (finished) return;
-    Close();
-    unlink(temporary.c_str());
+    Close();  // before the temporary is removed
   }
 
   absl::Status Create();
@@ -142,7 +122,7 @@ struct DatasetWriter::State {
   bool shifted() const { return options.layout == DatasetLayout::kD4rlPybullet; }
 
   std::string path;
-  std::string temporary;  // beside it
+  std::unique_ptr<TemporaryFile> file_on_disk;  // beside it
   DatasetWriterOptions options;
   bool finished = false;
   bool unfinished_episode = false;  // the last one added
@@ -158,19 +138,17 @@ struct DatasetWriter::State {
 
 absl::Status DatasetWriter::State::Create() {
   SilenceHdf5();
-  const int fd = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (fd < 0) return ErrnoStatus(errno, "cannot write", temporary);
-  close(fd);
-  file = Hdf5Id(H5Fcreate(temporary.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
-  if (!file.ok()) return WriteError(temporary, "create");
+  ASSIGN_OR_RETURN(file_on_disk, TemporaryFile::Create(path));
+  file = Hdf5Id(H5Fcreate(file_on_disk->name().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
+  if (!file.ok()) return WriteError(path, "create");
   boolean = BooleanType();
   if (!WriteText(file.get(), "layout", DatasetLayoutName(options.layout)) ||
       !WriteText(file.get(), "env", options.env.name) ||
       !WriteNumber(file.get(), "max_episode_steps", options.env.max_episode_steps)) {
-    return WriteError(temporary, "write");
+    return WriteError(path, "write");
   }
   const auto make = [&](const char* name, hid_t type, int width) {
-    return GrowingArray::Create(file.get(), temporary, name, type, {width, options.compression});
+    return GrowingArray::Create(file.get(), path, name, type, {width, options.compression});
   };
   const int observation_size = options.env.observation_size;
   ASSIGN_OR_RETURN(observation_array, make("observations", H5T_IEEE_F32LE, observation_size));
@@ -218,14 +196,13 @@ void DatasetWriter::State::AddRow(const EpisodeView& episode, int t) {
 absl::Status DatasetWriter::State::Flush() {
   const hsize_t count = rewards.size();
   if (count == 0) return absl::OkStatus();
-  RETURN_IF_ERROR(observation_array->Append(temporary, H5T_NATIVE_FLOAT, observations.data(), count));
-  RETURN_IF_ERROR(action_array->Append(temporary, H5T_NATIVE_FLOAT, actions.data(), count));
-  RETURN_IF_ERROR(reward_array->Append(temporary, H5T_NATIVE_FLOAT, rewards.data(), count));
-  RETURN_IF_ERROR(terminal_array->Append(temporary, boolean.get(), terminals.data(), count));
-  RETURN_IF_ERROR(timeout_array->Append(temporary, boolean.get(), timeouts.data(), count));
+  RETURN_IF_ERROR(observation_array->Append(path, H5T_NATIVE_FLOAT, observations.data(), count));
+  RETURN_IF_ERROR(action_array->Append(path, H5T_NATIVE_FLOAT, actions.data(), count));
+  RETURN_IF_ERROR(reward_array->Append(path, H5T_NATIVE_FLOAT, rewards.data(), count));
+  RETURN_IF_ERROR(terminal_array->Append(path, boolean.get(), terminals.data(), count));
+  RETURN_IF_ERROR(timeout_array->Append(path, boolean.get(), timeouts.data(), count));
   if (!shifted()) {
-    RETURN_IF_ERROR(
-        next_observation_array->Append(temporary, H5T_NATIVE_FLOAT, next_observations.data(), count));
+    RETURN_IF_ERROR(next_observation_array->Append(path, H5T_NATIVE_FLOAT, next_observations.data(), count));
   }
   for (std::vector<float>* const values : {&observations, &actions, &rewards, &next_observations})
     values->clear();
@@ -257,7 +234,6 @@ absl::StatusOr<std::unique_ptr<DatasetWriter>> DatasetWriter::Create(const std::
   }
   auto state = std::make_unique<State>();
   state->path = path;
-  state->temporary = absl::StrCat(path, ".partial-", getpid());
   state->options = options;
   RETURN_IF_ERROR(state->Create());
   return std::unique_ptr<DatasetWriter>(new DatasetWriter(std::move(state)));
@@ -288,8 +264,8 @@ absl::Status DatasetWriter::Finish() {
   SilenceHdf5();
   DBR_CHECK(!state_->finished);
   RETURN_IF_ERROR(state_->Flush());
-  if (!state_->Close()) return WriteError(state_->temporary, "write");
-  RETURN_IF_ERROR(SyncAndRename(state_->temporary, state_->path));
+  if (!state_->Close()) return WriteError(state_->path, "write");
+  RETURN_IF_ERROR(state_->file_on_disk->Commit());
   state_->finished = true;
   return absl::OkStatus();
 }
