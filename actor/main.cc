@@ -11,6 +11,7 @@
 #include "core/run_folder.h"
 #include "core/shutdown.h"
 #include "deploy/manual/man_page.h"
+#include "deploy/manual/number_option.h"
 #include "nn/blas_setup.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/exit_status.h"
@@ -34,11 +35,11 @@ void Declare(CLI::App* app, Flags* flags) {
   app->add_option("--config", flags->config, "Config file")->required()->type_name("FILE");
   app->add_option("--run-dir", flags->run_dir, "Folder of the run")->required()->type_name("DIR");
   app->add_option("--index", flags->index, "Number of this actor among the actors of the run")
-      ->check(CLI::Range(0, 1023))
+      ->transform(WholeNumber(0, 1023))
       ->type_name("N");
   app->add_option("--processes", flags->processes,
                   "How many actors the run has, for what they do together [as the config says, or 1]")
-      ->check(CLI::Range(0, 1024))
+      ->transform(WholeNumber(0, 1024))
       ->type_name("N");
   app->add_option("--replay", flags->replay,
                   "Address of the replay server [the config's, else the socket in the run folder]")

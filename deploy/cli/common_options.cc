@@ -7,6 +7,7 @@
 #include "core/status_macros.h"
 #include "deploy/cli/shipped_file.h"
 #include "deploy/launch/run_access.h"
+#include "deploy/manual/number_option.h"
 
 namespace dbr {
 
@@ -23,7 +24,10 @@ CLI::Option* AddModeOption(CLI::App* command, const std::string& text, std::stri
 }
 
 CLI::Option* AddSeedOption(CLI::App* command, const std::string& text, std::uint64_t* seed) {
-  return command->add_option("--seed", *seed, text)->capture_default_str()->type_name("N");
+  return command->add_option("--seed", *seed, text)
+      ->capture_default_str()
+      ->transform(WholeNumber())
+      ->type_name("N");
 }
 
 absl::StatusOr<std::shared_ptr<const PolicyNetworks>> OpenNamedPolicy(const std::string& name) {

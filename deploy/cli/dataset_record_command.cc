@@ -15,6 +15,7 @@
 #include "deploy/cli/dataset_command.h"
 #include "deploy/cli/shipped_file.h"
 #include "deploy/launch/run_access.h"
+#include "deploy/manual/number_option.h"
 #include "deploy/record/recorder.h"
 #include "deploy/record/store_episodes.h"
 #include "deploy/terminal/progress_bar.h"
@@ -182,7 +183,7 @@ void AddDatasetRecord(CLI::App* dataset, int* exit_code) {
       ->type_name("random|medium|mixed");
   command
       ->add_option("--steps", flags->steps, "Transitions to record [mixed: all that the run's store holds]")
-      ->check(CLI::Range(std::int64_t{1}, kMaxSteps))
+      ->transform(WholeNumber(1, kMaxSteps))
       ->type_name("N");
   command
       ->add_option("--out", flags->out,

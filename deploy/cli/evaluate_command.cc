@@ -21,6 +21,7 @@
 #include "deploy/film/film.h"
 #include "deploy/launch/result_tables.h"
 #include "deploy/launch/results.h"
+#include "deploy/manual/number_option.h"
 #include "deploy/process/interrupt.h"
 #include "deploy/terminal/terminal.h"
 #include "envs/env.h"
@@ -117,7 +118,7 @@ void AddEvaluate(CLI::App* app, int* exit_code) {
       ->add_option("--episodes", flags->episodes,
                    "Episodes to play; against an opponent, games, of which it begins every second one")
       ->capture_default_str()
-      ->check(CLI::Range(1, 1 << 20))
+      ->transform(WholeNumber(1, 1 << 20))
       ->type_name("N");
   AddSeedOption(command, "Random seed: the same one plays the same games", &flags->seed);
   AddModeOption(command, "How the policy acts", &flags->mode);

@@ -19,6 +19,7 @@
 #include "deploy/experiment/grid.h"
 #include "deploy/experiment/run.h"
 #include "deploy/experiment/schedule.h"
+#include "deploy/manual/number_option.h"
 #include "deploy/terminal/output.h"
 #include "deploy/terminal/terminal.h"
 #include "proto/config/experiment_file.h"
@@ -91,7 +92,7 @@ void AddChoices(CLI::App* command, ExperimentFlags* flags) {
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   command->add_option("--seeds", flags->cells.seeds, "Seeds 1 to N of each cell [as the scale says]")
-      ->check(CLI::Range(1, 1000))
+      ->transform(WholeNumber(1, 1000))
       ->type_name("N");
   command
       ->add_option("--scale", flags->cells.scale, "How long the cells run: a scale of the grid [its first]")
@@ -102,7 +103,7 @@ void AddWays(CLI::App* command, ExperimentFlags* flags) {
   command
       ->add_option("--jobs", flags->run.capacity.jobs,
                    "Cells at once [as many as the cores carry: one core a learner, one an actor process]")
-      ->check(CLI::Range(1, 1024))
+      ->transform(WholeNumber(1, 1024))
       ->type_name("N");
   command->add_option("--run-dir", flags->cells.run_dir, "Folder of the runs [runs/NAME-SCALE]")
       ->type_name("DIR");

@@ -16,6 +16,7 @@
 #include "deploy/cli/shipped_file.h"
 #include "deploy/launch/launch.h"
 #include "deploy/launch/run_plan.h"
+#include "deploy/manual/number_option.h"
 #include "deploy/terminal/output.h"
 
 namespace dbr {
@@ -52,7 +53,9 @@ void AddLaunch(CLI::App* app, int* exit_code) {
       ->type_name("PATH=VALUE")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  command->add_option("--seed", flags->seed, "Random seed: short for --set seed=N")->type_name("N");
+  command->add_option("--seed", flags->seed, "Random seed: short for --set seed=N")
+      ->transform(WholeNumber())
+      ->type_name("N");
   command->add_option("--run-dir", flags->options.run_dir, "Folder of the run [runs/ENV-ALGORITHM-DATE-TIME]")
       ->type_name("DIR");
   command->add_flag("--resume", flags->options.resume, "Continue the run in --run-dir");

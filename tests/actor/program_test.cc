@@ -128,6 +128,18 @@ TEST_F(ProgramTest, BadUsageExitsWith2) {
   EXPECT_THAT(incomplete.output(), HasSubstr("--config"));
 }
 
+TEST_F(ProgramTest, WhatIsNoWholeNumberExitsWith2) {
+  for (const char* option : {"--index", "--processes"}) {
+    for (const char* wrong : {"-1", "18446744073709551616", "1x", "1e3", "2000", ""}) {
+      std::vector<std::string> flags = Flags(kSmall);
+      flags.insert(flags.end(), {option, wrong});
+      Program program(flags);
+      EXPECT_EQ(program.Wait(), 2) << option << " " << wrong;
+      EXPECT_THAT(program.output(), HasSubstr("expected a whole number of 0 to 102")) << option << wrong;
+    }
+  }
+}
+
 TEST_F(ProgramTest, WhatIsNoAddressExitsWith2) {
   for (const char* option : {"--replay", "--learner"}) {
     std::vector<std::string> flags = Flags(kSmall);
