@@ -1,5 +1,4 @@
 // dbr-actor: acts and writes transitions, or with --evaluate plays evaluation episodes.
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
@@ -82,7 +81,7 @@ int Main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : kFinalExit;
   }
   const std::string name = flags.evaluate ? "evaluator" : absl::StrCat("actor-", flags.index);
-  spdlog::set_default_logger(spdlog::stderr_color_mt(name));
+  UseStderrLog(name);
 
   absl::StatusOr<Config> config = LoadConfig(flags.config);
   if (!config.ok()) return Fail(config.status());

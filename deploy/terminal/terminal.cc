@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -98,7 +99,8 @@ std::string Truncate(absl::string_view text, int width) {
 }
 
 bool IsTerminal(int fd) {
-  return isatty(fd) == 1;
+  const char* const type = std::getenv("TERM");
+  return type != nullptr && *type != '\0' && absl::string_view(type) != "dumb" && isatty(fd) == 1;
 }
 
 int TerminalWidth(int fd, int otherwise) {

@@ -34,7 +34,8 @@ std::string PadLeft(absl::string_view text, int width);
 // The first `width` cells of the text.
 std::string Truncate(absl::string_view text, int width);
 
-// Whether the file descriptor is a terminal.
+// Whether the file descriptor is a terminal that can be written over: not where TERM is unset, empty or
+// "dumb", for such a terminal shows escape sequences as text and is written to as a file is.
 bool IsTerminal(int fd);
 // The columns and rows of the terminal at `fd`; `otherwise` where it is none.
 int TerminalWidth(int fd, int otherwise);

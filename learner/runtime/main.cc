@@ -1,5 +1,4 @@
 // dbr-learner: trains an algorithm from a replay server and serves its policy.
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
@@ -152,7 +151,7 @@ absl::Status ChooseAddresses(const Config& config, Arguments* arguments) {
 }
 
 int Main(int argc, char** argv) {
-  spdlog::set_default_logger(spdlog::stderr_color_mt("learner"));
+  UseStderrLog("learner");
   CLI::App app("Trains an algorithm from a replay server and serves its policy.", "dbr-learner");
   Arguments arguments;
   AddServiceFlags("Folder of the run: checkpoints, policy, metrics",

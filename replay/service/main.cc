@@ -1,5 +1,4 @@
 // dbr-replay: keeps the transitions of a run and serves them.
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
@@ -83,7 +82,7 @@ absl::Status Serve(const ServiceArguments& arguments, const Config& config) {
 }
 
 int Main(int argc, char** argv) {
-  spdlog::set_default_logger(spdlog::stderr_color_mt("replay"));
+  UseStderrLog("replay");
   CLI::App app("Keeps the transitions of a run and serves them.", "dbr-replay");
   ServiceArguments arguments;
   AddServiceFlags("Folder of the run, where the store lies", "Continue the store that the run folder has",
