@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "actor/actor.h"
+#include "core/exhaustion.h"
 #include "core/run_folder.h"
 #include "core/shutdown.h"
 #include "deploy/manual/man_page.h"
@@ -83,6 +84,7 @@ int Main(int argc, char** argv) {
   const std::string name = flags.evaluate ? "evaluator" : absl::StrCat("actor-", flags.index);
   UseStderrLog(name);
 
+  if (const absl::Status memory = CheckBlasMemory(/*threads=*/1); !memory.ok()) return Fail(memory, 1);
   absl::StatusOr<Config> config = LoadConfig(flags.config);
   if (!config.ok()) return Fail(config.status());
   const RunFolder run{flags.run_dir};
@@ -107,6 +109,7 @@ int Main(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   dbr::RestartWithBlasSetUp(argv);
+  dbr::EndWhereResourcesAreExhausted();
   dbr::BlockShutdownSignals();
   return dbr::Main(argc, argv);
 }

@@ -34,6 +34,7 @@ void BlockShutdownSignals() {
   const sigset_t set = StopSignals();
   DBR_CHECK(pthread_sigmask(SIG_BLOCK, &set, nullptr) == 0);
   signal(SIGPIPE, SIG_IGN);
+  signal(SIGXFSZ, SIG_IGN);
 }
 
 std::thread ThreadWithoutSignals(std::function<void()> run) {

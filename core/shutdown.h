@@ -13,9 +13,10 @@ namespace dbr {
 // that, as nohup does.
 sigset_t StopSignals(bool hangup = false);
 
-// Blocks the StopSignals() in the calling thread and in all threads it starts later, and ignores SIGPIPE. It
-// is the first line of every main: a gRPC thread that existed before would take the signal and nothing would
-// drain.
+// Blocks the StopSignals() in the calling thread and in all threads it starts later, and ignores SIGPIPE and
+// SIGXFSZ: a pipe without a reader, and a file that reaches the limit of `ulimit -f`, are errors of the
+// write. It is the first line of every main: a gRPC thread that existed before would take the signal and
+// nothing would drain.
 void BlockShutdownSignals();
 
 // Starts a thread in which all signals are blocked: they are for the process's other threads, also for one

@@ -1,15 +1,19 @@
 #include "nn/blas_setup.h"
 
 #include <cblas.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <string>
 #include <vector>
+
+#include "absl/strings/str_cat.h"
 
 extern "C" void openblas_set_num_threads(int threads);
 
@@ -21,6 +25,11 @@ constexpr char kKernel[] = "OPENBLAS_CORETYPE";
 // This kernel multiplies and adds halves of a vector at once, which is right where a processor splits vectors
 // anyway.
 constexpr char kOtherKernel[] = "Excavator";
+
+// What OpenBLAS takes for a thread's products: BUFFER_SIZE of its kernels for x86-64.
+constexpr std::size_t kBytesOfABuffer = std::size_t{128} << 20;
+// For all else that a program does once it has begun: stacks of threads, heaps, environments.
+constexpr std::size_t kBytesBeside = std::size_t{256} << 20;
 
 // The least seconds of a few runs, for others may hold the core meanwhile.
 template <class Function>
@@ -38,6 +47,20 @@ double LeastSeconds(const Function& function) {
 
 void UseOneBlasThread() {
   openblas_set_num_threads(1);
+}
+
+absl::Status CheckBlasMemory(int threads) {
+  const std::size_t bytes = kBytesBeside + kBytesOfABuffer * static_cast<std::size_t>(std::max(threads, 1));
+  void* const memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (memory != MAP_FAILED) {
+    munmap(memory, bytes);
+    return absl::OkStatus();
+  }
+  const std::string reason = std::strerror(errno);
+  return absl::ResourceExhaustedError(
+      absl::StrCat("cannot multiply matrices: expected ", bytes >> 20, " MiB of address space for ",
+                   std::max(threads, 1), threads > 1 ? " threads" : " thread", ", found less (", reason,
+                   "). Raise the limit that `ulimit -v` shows, or free memory."));
 }
 
 void PlainProduct(const float* a, const float* b, float* c) {

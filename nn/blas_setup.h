@@ -2,6 +2,8 @@
 // with a kernel that suits the processor.
 #pragma once
 
+#include "absl/status/status.h"
+
 namespace dbr {
 
 // Keeps OpenBLAS from using threads of its own for matrix products.
@@ -13,6 +15,12 @@ void UseOneBlasThread();
 // loaded and starts its threads then, before main can block a signal: such a thread would take a SIGTERM and
 // the program would die without draining. Does nothing where OPENBLAS_NUM_THREADS is 1 already.
 void RestartWithBlasSetUp(char** argv);
+
+// Checks that `threads` threads can multiply at once. OpenBLAS takes a buffer of address space for each, and
+// where it gets none it asks again for ever; a limit of `ulimit -v`, or a machine without memory to promise,
+// is found here. ResourceExhausted says how much was asked for. Belongs before the first product, where
+// others can still be told; it takes and gives back the address space and touches no memory.
+absl::Status CheckBlasMemory(int threads);
 
 // A matrix product by a plain loop: c = a b, all column-major [kTrialSize x kTrialSize].
 inline constexpr int kTrialSize = 64;

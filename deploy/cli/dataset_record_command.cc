@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -22,6 +23,7 @@
 #include "deploy/terminal/terminal.h"
 #include "envs/env.h"
 #include "envs/registry/registry.h"
+#include "nn/blas_setup.h"
 #include "replay/dataset/dataset_writer.h"
 
 namespace dbr {
@@ -139,6 +141,7 @@ absl::StatusOr<RunStore> OpenRunOf(const RecordFlags& flags, const EnvSpec& env)
 
 absl::Status Record(const RecordFlags& flags, const Interrupt& interrupt) {
   ASSIGN_OR_RETURN(const std::optional<DatasetLayout> layout, ParseLayoutOption("--layout", flags.layout));
+  RETURN_IF_ERROR(CheckBlasMemory(static_cast<int>(std::thread::hardware_concurrency())));
   ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv({.name = flags.env, .opponents = {}}));
   RETURN_IF_ERROR(CheckFlags(flags, env->spec()));
   const DatasetWriterOptions options{.layout = layout.value_or(DatasetLayout::kD4rl), .env = env->spec()};

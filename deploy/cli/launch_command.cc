@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -18,6 +19,7 @@
 #include "deploy/launch/run_plan.h"
 #include "deploy/manual/number_option.h"
 #include "deploy/terminal/output.h"
+#include "nn/blas_setup.h"
 
 namespace dbr {
 namespace {
@@ -28,6 +30,8 @@ struct LaunchFlags {
 };
 
 absl::StatusOr<int> RunLaunch(const LaunchFlags& flags) {
+  // For the final evaluation, before hours of training.
+  RETURN_IF_ERROR(CheckBlasMemory(static_cast<int>(std::thread::hardware_concurrency())));
   LaunchOptions options = flags.options;
   if (flags.seed.has_value()) options.overrides.push_back(absl::StrCat("seed=", *flags.seed));
   if (!options.config.empty()) {

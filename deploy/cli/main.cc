@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 
 #include "absl/strings/str_cat.h"
+#include "core/exhaustion.h"
 #include "core/shutdown.h"
 #include "deploy/cli/command_line.h"
 #include "deploy/launch/commit.h"
@@ -43,6 +44,7 @@ int Main(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   dbr::RestartWithBlasSetUp(argv);  // and so do the programs that we start
+  dbr::EndWhereResourcesAreExhausted();
   dbr::BlockShutdownSignals();
   return Main(argc, argv);
 }

@@ -1,6 +1,7 @@
 #include "deploy/launch/run_access.h"
 
 #include <filesystem>
+#include <thread>
 #include <utility>
 
 #include "absl/strings/match.h"
@@ -8,6 +9,7 @@
 #include "core/run_folder.h"
 #include "core/safetensors.h"
 #include "core/status_macros.h"
+#include "nn/blas_setup.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/address.h"
 
@@ -22,6 +24,8 @@ absl::StatusOr<std::shared_ptr<const PolicyNetworks>> OpenPolicy(const std::stri
                                             "' has no policy/latest.safetensors: expected a run folder ",
                                             "whose learner has pushed a policy, or a policy file"));
   }
+  // Before the first product of whoever asks.
+  RETURN_IF_ERROR(CheckBlasMemory(static_cast<int>(std::thread::hardware_concurrency())));
   ASSIGN_OR_RETURN(PolicySnapshot snapshot, LoadPolicy(path));
   absl::StatusOr<std::shared_ptr<const PolicyNetworks>> policy = PolicyNetworks::Create(std::move(snapshot));
   if (policy.ok()) return policy;

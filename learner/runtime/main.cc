@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
+#include "core/exhaustion.h"
 #include "core/run_folder.h"
 #include "core/shutdown.h"
 #include "core/status_macros.h"
@@ -97,6 +98,7 @@ void WriteEvaluation(const EvaluationReport& report, MetricsSink* metrics) {
 }
 
 absl::Status Serve(const Arguments& arguments, const Config& config) {
+  RETURN_IF_ERROR(CheckBlasMemory(/*threads=*/2));  // the second network's, where the config asks for it
   const LearnerConfig& learner = config.learner();
   ASSIGN_OR_RETURN(const AlgorithmSpec spec, MakeSpec(config));
   ASSIGN_OR_RETURN(std::unique_ptr<Algorithm> algorithm, MakeAlgorithm(spec));
@@ -189,6 +191,7 @@ int Main(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   dbr::RestartWithBlasSetUp(argv);
+  dbr::EndWhereResourcesAreExhausted();
   dbr::BlockShutdownSignals();
   return dbr::Main(argc, argv);
 }

@@ -37,7 +37,8 @@ class Hdf5Id {
   Closer close_ = nullptr;
 };
 
-// Keeps the library from printing this thread's errors to stderr. Call it before anything else.
+// Keeps the library from printing this thread's errors to stderr, and from closing files while the program
+// exits. Call it before anything else.
 void SilenceHdf5();
 
 // The names in a group of a file, sorted; none where it is no group.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/synchronization/notification.h"
+#include "core/exhaustion.h"
 #include "core/run_folder.h"
 #include "core/shutdown.h"
 #include "core/status_macros.h"
@@ -112,6 +113,7 @@ int Main(int argc, char** argv) {
 }  // namespace dbr
 
 int main(int argc, char** argv) {
+  dbr::EndWhereResourcesAreExhausted();
   dbr::BlockShutdownSignals();
   return dbr::Main(argc, argv);
 }

@@ -1,13 +1,16 @@
 #include "core/shutdown.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <memory>
 
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
+#include "tests/support/temp_dir.h"
 
 namespace dbr {
 namespace {
@@ -71,6 +74,22 @@ TEST_F(ShutdownTest, ASignalBeforeTheWatcherIsNotLost) {
   kill(getpid(), SIGTERM);
   const auto watcher = Watch();
   EXPECT_TRUE(WaitForCount(1));
+}
+
+TEST_F(ShutdownTest, AFileThatReachesItsLimitIsAnErrorOfTheWriteNotASignal) {
+  const TempDir folder;
+  const int fd = open((folder / "file").c_str(), O_WRONLY | O_CREAT, 0600);
+  ASSERT_GE(fd, 0);
+  rlimit old_limit;
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &old_limit), 0);
+  rlimit limit = old_limit;
+  limit.rlim_cur = 1;
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &limit), 0);
+  EXPECT_EQ(write(fd, "xy", 2), 1);
+  EXPECT_EQ(write(fd, "y", 1), -1);
+  EXPECT_EQ(errno, EFBIG);
+  EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &old_limit), 0);
+  close(fd);
 }
 
 TEST_F(ShutdownTest, ABrokenPipeIsAnErrorOfTheWriteNotASignal) {

@@ -1,6 +1,8 @@
 #include "nn/blas_setup.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <Eigen/Core>
 #include <fstream>
@@ -31,6 +33,20 @@ TEST(BlasSetUp, TakesAnotherKernelOnlyWhereItsInstructionsRun) {
   } else if (flags.find(" fma4 ") != std::string::npos) {
     EXPECT_TRUE(RunsOtherKernel());
   }
+}
+
+TEST(BlasSetUp, TooLittleAddressSpaceIsFoundBeforeTheFirstProduct) {
+  EXPECT_TRUE(CheckBlasMemory(1).ok());
+  EXPECT_TRUE(CheckBlasMemory(0).ok());
+  rlimit old_limit;
+  ASSERT_EQ(getrlimit(RLIMIT_AS, &old_limit), 0);
+  rlimit limit = old_limit;
+  limit.rlim_cur = rlim_t{1} << 40;
+  ASSERT_EQ(setrlimit(RLIMIT_AS, &limit), 0);
+  const absl::Status status = CheckBlasMemory(1 << 20);
+  EXPECT_EQ(setrlimit(RLIMIT_AS, &old_limit), 0);
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(std::string(status.message()), testing::HasSubstr("ulimit -v"));
 }
 
 }  // namespace
