@@ -10,6 +10,7 @@
 #include "core/exhaustion.h"
 #include "core/run_folder.h"
 #include "core/shutdown.h"
+#include "core/standard_streams.h"
 #include "deploy/manual/man_page.h"
 #include "deploy/manual/number_option.h"
 #include "nn/blas_setup.h"
@@ -109,6 +110,7 @@ int Main(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   dbr::RestartWithBlasSetUp(argv);
+  dbr::HoldStandardStreams();
   dbr::EndWhereResourcesAreExhausted();
   dbr::BlockShutdownSignals();
   return dbr::Main(argc, argv);

@@ -1,15 +1,44 @@
 // dbr: launches runs, and asks about them.
+#include <signal.h>
+
 #include <CLI/CLI.hpp>
+#include <cstdio>
+#include <iostream>
+#include <string>
 
 #include "absl/strings/str_cat.h"
 #include "core/exhaustion.h"
 #include "core/shutdown.h"
+#include "core/standard_streams.h"
 #include "deploy/cli/command_line.h"
 #include "deploy/launch/commit.h"
 #include "deploy/manual/man_page.h"
 #include "nn/blas_setup.h"
 
 namespace {
+
+constexpr int kClosedPipeExit = 128 + SIGPIPE;  // as the shell tells of programs that the signal ended
+
+// Runs leave their results in files, and a terminal or a log that is gone does not make them fail.
+bool ResultIsPrinted(const CLI::App& app) {
+  if (app.got_subcommand("launch")) return app.get_subcommand("launch")->count("--help") > 0;
+  if (!app.got_subcommand("experiment")) return true;
+  const CLI::App* const experiment = app.get_subcommand("experiment");
+  return experiment->count("--help") + experiment->count("--dry-run") > 0;
+}
+
+// The exit status, unless what was printed is lost: then the command has failed. A reader that has gone away
+// knows that, and is told nothing.
+int WithLostOutput(int exit_code) {
+  bool reader_gone = false;
+  std::cout.flush();
+  const std::string lost = dbr::LostOutput(&reader_gone);
+  if (lost.empty()) return exit_code;
+  if (reader_gone) return exit_code == 0 ? kClosedPipeExit : exit_code;
+  std::fprintf(stderr, "dbr: the output is lost, or a part of it: %s. Give it a place and call again.\n",
+               lost.c_str());
+  return exit_code == 0 ? 1 : exit_code;
+}
 
 int Main(int argc, char** argv) {
   CLI::App app("Dual Behavior Regularized reinforcement learning: trains, watches and examines policies.",
@@ -35,15 +64,16 @@ int Main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    exit_code = app.exit(error) == 0 ? 0 : 2;
   }
-  return exit_code;
+  return ResultIsPrinted(app) ? WithLostOutput(exit_code) : exit_code;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   dbr::RestartWithBlasSetUp(argv);  // and so do the programs that we start
+  dbr::HoldStandardStreams();
   dbr::EndWhereResourcesAreExhausted();
   dbr::BlockShutdownSignals();
   return Main(argc, argv);

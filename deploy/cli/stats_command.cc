@@ -51,6 +51,7 @@ absl::StatusOr<int> RunStats(const StatsFlags& flags) {
                                                               ": ", stats.status().message()));
     }
     Print(flags, address, *stats);
+    if (std::ferror(stdout) != 0) break;  // nobody reads it, and main says so
   } while (flags.watch && !interrupt.WaitFor(kWatchEvery));
   return interrupt.flag() ? kInterruptedExit : 0;
 }

@@ -10,6 +10,7 @@
 #include "core/exhaustion.h"
 #include "core/run_folder.h"
 #include "core/shutdown.h"
+#include "core/standard_streams.h"
 #include "core/status_macros.h"
 #include "core/stop_flag.h"
 #include "deploy/manual/man_page.h"
@@ -191,6 +192,7 @@ int Main(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   dbr::RestartWithBlasSetUp(argv);
+  dbr::HoldStandardStreams();
   dbr::EndWhereResourcesAreExhausted();
   dbr::BlockShutdownSignals();
   return dbr::Main(argc, argv);

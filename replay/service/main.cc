@@ -11,6 +11,7 @@
 #include "core/exhaustion.h"
 #include "core/run_folder.h"
 #include "core/shutdown.h"
+#include "core/standard_streams.h"
 #include "core/status_macros.h"
 #include "deploy/manual/man_page.h"
 #include "envs/env.h"
@@ -113,6 +114,7 @@ int Main(int argc, char** argv) {
 }  // namespace dbr
 
 int main(int argc, char** argv) {
+  dbr::HoldStandardStreams();
   dbr::EndWhereResourcesAreExhausted();
   dbr::BlockShutdownSignals();
   return dbr::Main(argc, argv);
