@@ -199,7 +199,8 @@ TEST_F(RunPlanTest, AnAddressThatIsNoneIsRefusedBeforeAFolderIsMade) {
       EXPECT_FALSE(std::filesystem::exists(run_)) << address;
     }
   }
-  EXPECT_TRUE(PrepareRun(Options({"replay.address='0.0.0.0:7000'", "replay.allow_insecure=true"}), kNow).ok());
+  EXPECT_TRUE(
+      PrepareRun(Options({"replay.address='0.0.0.0:7000'", "replay.allow_insecure=true"}), kNow).ok());
 }
 
 TEST_F(RunPlanTest, RefusesAnAddressThatNobodyCouldBeTold) {
