@@ -123,6 +123,11 @@ function(dbr_test name)
   if(ARG_PROGRAMS)
     add_dependencies(${name} ${ARG_PROGRAMS})
   endif()
+  # An empty value would take the name of the next property for it.
+  set(labels)
+  if(ARG_LABELS)
+    set(labels LABELS "${ARG_LABELS}")
+  endif()
   gtest_discover_tests(${name} TEST_PREFIX "${name}/" NO_PRETTY_VALUES DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
-    PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}" PROCESSORS ${ARG_CORES} ENVIRONMENT OPENBLAS_NUM_THREADS=1)
+    PROPERTIES TIMEOUT ${ARG_TIMEOUT} ${labels} PROCESSORS ${ARG_CORES} ENVIRONMENT OPENBLAS_NUM_THREADS=1)
 endfunction()
