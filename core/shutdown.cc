@@ -30,11 +30,15 @@ sigset_t StopSignals(bool hangup) {
   return set;
 }
 
+void IgnoreWriteSignals() {
+  signal(SIGPIPE, SIG_IGN);
+  signal(SIGXFSZ, SIG_IGN);
+}
+
 void BlockShutdownSignals() {
   const sigset_t set = StopSignals();
   DBR_CHECK(pthread_sigmask(SIG_BLOCK, &set, nullptr) == 0);
-  signal(SIGPIPE, SIG_IGN);
-  signal(SIGXFSZ, SIG_IGN);
+  IgnoreWriteSignals();
 }
 
 std::thread ThreadWithoutSignals(std::function<void()> run) {
@@ -52,6 +56,7 @@ int OpenShutdownSignals() {
 }
 
 ShutdownWatcher::ShutdownWatcher(std::function<void()> on_signal) {
+  BlockShutdownSignals();
   signal_fd_ = OpenShutdownSignals();
   stop_fd_ = eventfd(0, EFD_CLOEXEC);
   DBR_CHECK(signal_fd_ >= 0 && stop_fd_ >= 0);

@@ -2,9 +2,11 @@
 #include <signal.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <iostream>
 #include <string>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "core/exhaustion.h"
@@ -14,6 +16,7 @@
 #include "deploy/launch/commit.h"
 #include "deploy/manual/man_page.h"
 #include "nn/blas_setup.h"
+#include "proto/config/config_fields.h"
 
 namespace {
 
@@ -40,6 +43,17 @@ int WithLostOutput(int exit_code) {
   return exit_code == 0 ? 1 : exit_code;
 }
 
+// Says which word is no command, where that is what is wrong: CLI11 says only that a command is missing.
+bool WithUnknownCommand(const CLI::App& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return false;
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(command->get_name());
+  if (std::find(names.begin(), names.end(), argv[1]) != names.end()) return false;
+  std::fprintf(stderr, "dbr: unknown command '%s'; %s\n", argv[1], dbr::Suggest(argv[1], names).c_str());
+  return true;
+}
+
 int Main(int argc, char** argv) {
   CLI::App app("Dual Behavior Regularized reinforcement learning: trains, watches and examines policies.",
                "dbr");
@@ -64,7 +78,7 @@ int Main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    exit_code = app.exit(error) == 0 ? 0 : 2;
+    exit_code = WithUnknownCommand(app, argc, argv) ? 2 : app.exit(error) == 0 ? 0 : 2;
   }
   return ResultIsPrinted(app) ? WithLostOutput(exit_code) : exit_code;
 }
@@ -75,6 +89,6 @@ int main(int argc, char** argv) {
   dbr::RestartWithBlasSetUp(argv);  // and so do the programs that we start
   dbr::HoldStandardStreams();
   dbr::EndWhereResourcesAreExhausted();
-  dbr::BlockShutdownSignals();
+  dbr::IgnoreWriteSignals();
   return Main(argc, argv);
 }

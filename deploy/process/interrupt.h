@@ -14,7 +14,8 @@ namespace dbr {
 // The exit status of an interrupted command, as shells use it.
 inline constexpr int kInterruptedExit = 130;
 
-// Remembers SIGINT and SIGTERM from its construction on. Requires BlockShutdownSignals() before. Thread-safe.
+// Remembers the StopSignals() from its construction on; before, they end the command. Make it before threads
+// are started. Thread-safe.
 class Interrupt {
  public:
   Interrupt() : watcher_([this] { Set(); }) {}

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -53,6 +54,23 @@ TEST_F(BadInputTest, WrongFlagsExitWith2) {
     const auto [status, output] = RunProgram("dbr", arguments);
     EXPECT_EQ(status, 2) << testing::PrintToString(arguments) << output;
     EXPECT_THAT(output, Not(IsEmpty()));
+  }
+}
+
+TEST_F(BadInputTest, AWordThatIsNoCommandIsNamed) {
+  const auto [status, message] = RunProgram("dbr", {"launhc", "x.textproto"});
+  EXPECT_EQ(status, 2);
+  EXPECT_THAT(message, HasSubstr("unknown command 'launhc'; did you mean 'launch'?"));
+  EXPECT_THAT(RunProgram("dbr", {"train"}).second, AllOf(HasSubstr("'train'"), HasSubstr("launch, stats")));
+}
+
+// It waits for a file that does not come: a signal ends it as it ends other programs.
+TEST_F(BadInputTest, ACommandThatSavesNothingEndsOnASignal) {
+  ASSERT_EQ(mkfifo((folder_ / "fifo").c_str(), 0600), 0);
+  for (const int number : {SIGINT, SIGTERM}) {
+    DbrProcess launch("dbr", {"launch", folder_ / "fifo"});
+    launch.Signal(number);
+    EXPECT_THAT(launch.Wait(), ::testing::AnyOf(-number, 130)) << launch.output();
   }
 }
 
