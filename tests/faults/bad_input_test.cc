@@ -115,7 +115,7 @@ TEST_F(BadInputTest, AnAddressInUseIsNamed) {
   const auto taken = StartServer({.address = "127.0.0.1:0"}, {});
   ASSERT_TRUE(taken.ok()) << taken.status();
   const auto [status, output] = Launch({"--set", absl::StrCat("replay.address='", taken->address, "'")});
-  EXPECT_EQ(status, 1) << output;
+  EXPECT_EQ(status, 2) << output;
   EXPECT_THAT(output, AllOf(HasSubstr(taken->address), HasSubstr("in use")));
   EXPECT_THAT(ProcessesOf("dbr", run_.root), IsEmpty());
 }
