@@ -85,7 +85,7 @@ int Main(int argc, char** argv) {
   const std::string name = flags.evaluate ? "evaluator" : absl::StrCat("actor-", flags.index);
   UseStderrLog(name);
 
-  if (const absl::Status memory = CheckBlasMemory(/*threads=*/1); !memory.ok()) return Fail(memory, 1);
+  if (const absl::Status memory = CheckBlasMemory(/*threads=*/1); !memory.ok()) return Fail(memory);
   absl::StatusOr<Config> config = LoadConfig(flags.config);
   if (!config.ok()) return Fail(config.status());
   const RunFolder run{flags.run_dir};
