@@ -26,8 +26,8 @@
 namespace dbr {
 namespace {
 
-// OK where the address of a section of the config, if it names one, is one that the launcher can hand to others
-// before the server listens. `field`: the section's.
+// OK where the address of a section of the config, if it names one, is one that the launcher can hand to
+// others before the server listens. `field`: the section's.
 template <class Section>
 absl::Status CheckAddressToTell(const Section& section, const char* field) {
   if (section.address().empty()) return absl::OkStatus();

@@ -92,8 +92,9 @@ class Supervisor {
   pid_t pid(const std::string& name) const;
 
   // Stops the children of each rank up to `last_rank` in turn: sends SIGTERM, and SIGKILL to those that still
-  // run after their grace or at the next stop signal; where there was none before, at the second. Blocks until all of them have ended. Returns whether
-  // every one ended by itself with status 0. Processes with `once` do not count.
+  // run after their grace or at the next stop signal; where there was none before, at the second. Blocks
+  // until all of them have ended. Returns whether every one ended by itself with status 0. Processes with
+  // `once` do not count.
   bool Stop(int last_rank = std::numeric_limits<int>::max());
 
  private:
