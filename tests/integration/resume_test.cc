@@ -85,6 +85,27 @@ TEST_F(ResumeTest, ARunWhoseFolderIsMovedEndsAndSaysSo) {
   EXPECT_THAT(ProcessesOf("dbr", run_.root), IsEmpty());
 }
 
+// What stands in the place of the folder of checkpoints, or of the summary, keeps them from being written.
+TEST_F(ResumeTest, ARunThatCannotSaveItsEndHasFailed) {
+  for (const bool checkpoints : {true, false}) {
+    const RunFolder run{folder_ / (checkpoints ? "no-checkpoints" : "no-summary")};
+    DbrProcess launch("dbr",
+                      {"launch", SmallConfig(), "--run-dir", run.root, "--set", "launch.max_seconds=6"});
+    ASSERT_TRUE(launch.Await([&] { return Counter(run, "relabelled") > 0; })) << launch.output();
+    if (checkpoints) {
+      std::filesystem::rename(run.checkpoints(), run.root + "/aside");
+      ASSERT_TRUE(WriteFileAtomically(run.checkpoints(), "in the way").ok());
+    } else {
+      std::filesystem::remove(run.summary());
+      std::filesystem::create_directories(run.summary() + "/in the way");
+    }
+    EXPECT_EQ(launch.Wait(), 1) << launch.output();
+    EXPECT_THAT(launch.output(), HasSubstr(checkpoints ? "NOT all could be saved" : run.summary()));
+    EXPECT_THAT(launch.output(), Not(HasSubstr("final evaluation")));
+    if (checkpoints) EXPECT_EQ(Summary(run)["ended"], "failed");
+  }
+}
+
 // A named pipe that is full, and that nobody reads.
 class StalledReader {
  public:
