@@ -71,7 +71,8 @@ absl::Status BestPolicy::Write(double mean, const PolicySnapshot& snapshot) cons
   file.metadata[kMean] = absl::StrFormat("%.17g", mean);
   file.metadata[kMeasure] = measure_;
   std::error_code ignored;  // SaveTensors then reports the error
-  std::filesystem::create_directories(std::filesystem::path(path_).parent_path(), ignored);
+  // Not the folder of the run: where that has gone, it was moved, and a new one would split the run.
+  std::filesystem::create_directory(std::filesystem::path(path_).parent_path(), ignored);
   return SaveTensors(file, path_);
 }
 

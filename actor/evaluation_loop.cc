@@ -164,7 +164,7 @@ absl::Status EvaluationLoop::EvaluateAll(const PolicyNetworks& policy, const Ite
 }
 
 void EvaluationLoop::SendReports() {
-  while (!unsent_.empty() && !closing_) {
+  while (!unsent_.empty()) {
     const absl::Status status = ports_.report(unsent_.front());
     if (!status.ok() && !IsFinal(status)) {
       if (std::exchange(said_loss_, true)) return;

@@ -96,9 +96,11 @@ absl::Status ErrnoStatus(int error_number, absl::string_view what, absl::string_
       return absl::PermissionDeniedError(message);
     case ENOSPC:
     case EDQUOT:
-    case EFBIG:
       return absl::ResourceExhaustedError(
           absl::StrCat(message, ". Free some space or choose another folder."));
+    case EFBIG:
+      return absl::ResourceExhaustedError(
+          absl::StrCat(message, ". Raise the limit of `ulimit -f`, or choose another disk."));
     default:
       return absl::InternalError(message);
   }

@@ -37,7 +37,7 @@ bool IsName(absl::string_view name) {
 }
 
 // False where another open file has the lock, or there are no locks. It belongs to the open file and not to
-// the process, and lies beside flock's, which HDF5 takes.
+// the process.
 bool Lock(int fd) {
   struct flock whole = {};
   whole.l_type = F_WRLCK;
@@ -59,7 +59,7 @@ void RemoveIfDead(int folder, const char* name) {
   const int fd = openat(folder, name, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) return;
   // Whoever makes a file now sees at its own lock, or at the name that is gone, that it must make another.
-  if (Lock(fd)) unlinkat(folder, name, 0);
+  if (Lock(fd) && IsNamed(fd)) unlinkat(folder, name, 0);
   close(fd);
 }
 

@@ -205,7 +205,8 @@ void SampledKl(const GaussianView<Scalar>& p, const GaussianView<Scalar>& q,
   CheckSameShape(p, q);
   const Eigen::Index dimensions = p.mean.rows(), n = p.mean.cols();
   DBR_CHECK(noise.rows() == dimensions && noise.cols() > 0 && noise.cols() % n == 0);
-  const auto draws = static_cast<Scalar>(noise.cols() / n);
+  const Eigen::Index samples = noise.cols() / n;
+  const auto draws = static_cast<Scalar>(samples);
   kl->setZero(n);
   if (d_p != nullptr) d_p->Resize(dimensions, n);
   for (Eigen::Index j = 0; j < n; ++j) {

@@ -6,7 +6,9 @@
 namespace dbr {
 
 void EvaluationFeed::Read(const LearnerStatus& answer) {
+  if (answer.life() == ended_life_ && ended_life_ != 0) return;  // it was long under way
   if (answer.life() != have_.life()) {
+    ended_life_ = have_.life();
     have_.set_life(answer.life());
     have_.set_newest_report(0);
   }

@@ -29,6 +29,7 @@ class EvaluationFeed {
   LearnerStatusRequest have_;
   std::vector<EvaluationReport> waiting_;
   std::uint64_t missed_ = 0;
+  std::uint64_t ended_life_ = 0;  // of the learner before this one; 0: none
 };
 
 }  // namespace dbr

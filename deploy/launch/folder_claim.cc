@@ -7,9 +7,11 @@
 #include <array>
 #include <cerrno>
 #include <filesystem>
+#include <set>
 #include <system_error>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
 #include "core/status_macros.h"
@@ -69,12 +71,24 @@ bool HasResults(const RunFolder& folder) {
   return (!error && metrics > 0) || !IsEmptyFolder(folder.policies());
 }
 
-// An earlier launch made the folder, and failed before its run began: nothing but its config, its logs and
-// how it failed is there.
+bool IsEventFile(const fs::path& path) {
+  return absl::StartsWith(path.filename().string(), "events.out.tfevents.");
+}
+
+// An earlier launch made the folder, for its lock is there, and failed before its run began: nothing else is
+// there but what a launch puts there itself.
 bool NeverBegan(const RunFolder& folder) {
   std::error_code error;
-  return fs::exists(folder.config(), error) && fs::exists(folder.log("launch"), error) && !HasBegun(folder) &&
-         !HasResults(folder);
+  if (!fs::exists(LockPath(folder), error) || HasBegun(folder) || HasResults(folder)) return false;
+  std::set<std::string> ours = {"replay.sock", "learner.sock"};
+  for (const std::string& path :
+       {LockPath(folder), folder.config(), NextConfig(folder), folder.logs(), folder.summary(),
+        folder.checkpoints(), folder.policies(), folder.metrics()})
+    ours.insert(fs::path(path).filename().string());
+  for (fs::directory_iterator entry(folder.root, error), end; entry != end; entry.increment(error)) {
+    if (!ours.contains(entry->path().filename().string()) && !IsEventFile(entry->path())) return false;
+  }
+  return !error;
 }
 
 // OK where nothing of value stands in the folder. `claimed`: the lock that may be there is ours.
@@ -223,6 +237,9 @@ void FolderClaim::Withdraw() {
   for (const std::string& path :
        {folder_.replay_store(), folder_.checkpoints(), folder_.policies(), folder_.metrics()}) {
     fs::remove_all(path, error);
+  }
+  for (fs::directory_iterator entry(folder_.root, error), end; entry != end; entry.increment(error)) {
+    if (IsEventFile(entry->path())) fs::remove(entry->path(), error);
   }
 }
 

@@ -106,7 +106,7 @@ absl::StatusOr<int> Launch::Run() {
   if (status.ok()) return Conclude(stopped);
   watch_.Fail(status);
   log_->error("{}", summary().failure);
-  SaveSummary().IgnoreError();  // the failure is told
+  if (plan_.claim->IsStillThere()) SaveSummary().IgnoreError();  // the failure is told
   return status;
 }
 
@@ -152,7 +152,8 @@ absl::StatusOr<int> Launch::GiveUp(const absl::Status& why) {
     log_->error("{}", std::string(why.message()));
     return why;
   }
-  Say(absl::StrCat("stopped before the run ", plan_.resume ? "went on: nothing of it has changed" : "began",
+  Say(absl::StrCat("stopped before the run ",
+                   plan_.resume ? "went on: its results are as they were" : "began",
                    "; the same command starts it\nrun folder: ", plan_.folder.root));
   return kInterruptedExit;
 }
@@ -291,7 +292,7 @@ Launch::Stopped Launch::StopAll(bool ask) {
   if (supervisor_ == nullptr) return {};
   Stopped stopped;
   stopped.actors_ended = supervisor_->Stop(kStopActors);
-  if (ask && monitor_ != nullptr) watch_.Count(monitor_->Ask(kLastAnswerWithin));
+  if (monitor_ != nullptr) watch_.Count(ask ? monitor_->Ask(kLastAnswerWithin) : monitor_->Take());
   monitor_.reset();
   stopped.services_saved = supervisor_->Stop();
   // The learner trained on between its last answer and its last save.

@@ -1,7 +1,7 @@
 #include "deploy/launch/run_summary.h"
 
 #include "absl/strings/str_cat.h"
-#include "deploy/terminal/terminal.h"
+#include "replay/dataset/dataset_facts.h"
 
 namespace dbr {
 
@@ -28,17 +28,9 @@ std::vector<EvaluationPoint> RunSummary::Update(const RunSample& sample) {
 }
 
 std::vector<std::string> SeedBufferWarnings(const SeedBufferSummary& seed_buffer) {
-  std::vector<std::string> warnings;
-  if (seed_buffer.rows > 0 && seed_buffer.episodes == 0) {
-    warnings.emplace_back(
-        "warning: no episode ends in the seed buffer, as if all its rows were one. Are the ends lost, or "
-        "under another key? dbr dataset info shows what the file holds");
-  }
-  if (seed_buffer.actions_outside > 0) {
-    warnings.push_back(absl::StrCat("warning: ", WithCommas(seed_buffer.actions_outside),
-                                    " rows of the seed buffer have actions outside [-1, 1], the range of ",
-                                    "the environment; they are taken as they are"));
-  }
+  std::vector<std::string> warnings =
+      DataWarnings({seed_buffer.rows, seed_buffer.episodes, seed_buffer.actions_outside});
+  for (std::string& warning : warnings) warning.insert(0, "warning: seed buffer: ");
   return warnings;
 }
 

@@ -39,12 +39,14 @@ class Output {
 
  private:
   void Run();
+  void TellOfDropped() ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_);
   // Writes one piece; false where it could not be written, now or ever.
   bool WritePiece(absl::string_view piece);
   bool HasWork() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return stopping_ || !pending_.empty(); }
   bool AllWritten() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return pending_.empty(); }
 
   const int fd_;
+  const int write_fd_;  // never blocks, where that can be had; -1: fd_ is written to
   const int stop_fd_;
   mutable absl::Mutex mutex_;
   std::string pending_ ABSL_GUARDED_BY(mutex_);

@@ -24,24 +24,26 @@ std::string JsonRow(std::int64_t step, double wall_time, const Scalars& scalars)
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<MetricsSink>> MetricsSink::Open(const RunFolder& folder,
-                                                               absl::Duration flush_interval,
-                                                               absl::Time now) {
+                                                               absl::Duration flush_interval, absl::Time now,
+                                                               std::function<absl::Time()> clock) {
   ASSIGN_OR_RETURN(auto rows, AppendFile::Open(folder.metrics()));
   RETURN_IF_ERROR(rows->DropPartialLine());
   ASSIGN_OR_RETURN(auto events,
                    AppendFile::Open(absl::StrCat(folder.root, "/", EventFileName(Seconds(now)))));
   RETURN_IF_ERROR(events->Append(VersionRecord(Seconds(now))));
-  return std::unique_ptr<MetricsSink>(
-      new MetricsSink(folder.metrics(), std::move(rows), std::move(events), flush_interval, now));
+  return std::unique_ptr<MetricsSink>(new MetricsSink(folder.metrics(), std::move(rows), std::move(events),
+                                                      flush_interval, std::move(clock)));
 }
 
 MetricsSink::MetricsSink(std::string path, std::unique_ptr<AppendFile> rows,
-                         std::unique_ptr<AppendFile> events, absl::Duration flush_interval, absl::Time now)
+                         std::unique_ptr<AppendFile> events, absl::Duration flush_interval,
+                         std::function<absl::Time()> clock)
     : path_(std::move(path)),
       rows_(std::move(rows)),
       events_(std::move(events)),
       flush_interval_(flush_interval),
-      last_write_(now) {}
+      clock_(std::move(clock)),
+      last_write_(clock_()) {}
 
 MetricsSink::~MetricsSink() {
   Flush().IgnoreError();
@@ -67,9 +69,10 @@ absl::Status MetricsSink::Write(std::int64_t step, absl::Time now, const Scalars
     absl::MutexLock lock(&mutex_);
     pending_rows_ += row;
     pending_events_ += event;
-    if (writing_ || now - last_write_ < flush_interval_) return absl::OkStatus();
+    const absl::Time here = clock_();
+    if (writing_ || here - last_write_ < flush_interval_) return absl::OkStatus();
     writing_ = true;
-    last_write_ = now;
+    last_write_ = here;
   }
   return WritePending();
 }

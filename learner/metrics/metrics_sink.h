@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -10,6 +11,7 @@
 #include "absl/status/statusor.h"
 #include "absl/synchronization/mutex.h"
 #include "absl/time/time.h"
+#include "core/monotonic_clock.h"
 #include "core/run_folder.h"
 #include "learner/metrics/append_file.h"
 #include "learner/metrics/event_file.h"
@@ -23,10 +25,11 @@ namespace dbr {
 class MetricsSink {
  public:
   // Appends to `folder`'s metrics.jsonl, which a resumed run goes on with (a row that a killed process left
-  // unfinished is cut off), and starts an event file beside it. `now` names the event file. Errors as
-  // core/file_io.h's.
+  // unfinished is cut off), and starts an event file beside it. `now` names the event file; `clock` is what
+  // the interval goes by. Errors as core/file_io.h's.
   static absl::StatusOr<std::unique_ptr<MetricsSink>> Open(const RunFolder& folder,
-                                                           absl::Duration flush_interval, absl::Time now);
+                                                           absl::Duration flush_interval, absl::Time now,
+                                                           std::function<absl::Time()> clock = MonotonicNow);
   ~MetricsSink();
   MetricsSink(const MetricsSink&) = delete;
   MetricsSink& operator=(const MetricsSink&) = delete;
@@ -47,7 +50,7 @@ class MetricsSink {
 
  private:
   MetricsSink(std::string path, std::unique_ptr<AppendFile> rows, std::unique_ptr<AppendFile> events,
-              absl::Duration flush_interval, absl::Time now);
+              absl::Duration flush_interval, std::function<absl::Time()> clock);
   // Writes what is pending. The caller has set writing_, which is cleared here.
   absl::Status WritePending() ABSL_LOCKS_EXCLUDED(mutex_);
   bool Idle() const ABSL_SHARED_LOCKS_REQUIRED(mutex_) { return !writing_; }
@@ -57,6 +60,7 @@ class MetricsSink {
   const std::unique_ptr<AppendFile> rows_;
   const std::unique_ptr<AppendFile> events_;
   const absl::Duration flush_interval_;
+  const std::function<absl::Time()> clock_;  // of the interval
 
   absl::Mutex mutex_;
   std::string pending_rows_ ABSL_GUARDED_BY(mutex_);

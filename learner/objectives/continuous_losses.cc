@@ -35,9 +35,10 @@ void MeanOfSmaller(const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar
                    VectorX<Scalar>* value) {
   const Eigen::Index n = value->size();
   DBR_CHECK(n > 0 && q1.cols() % n == 0 && q2.cols() == q1.cols());
+  const Eigen::Index draws = q1.cols() / n;
   value->setZero();
   for (Eigen::Index j = 0; j < q1.cols(); ++j) (*value)[j % n] += SmallerOrNan(q1(0, j), q2(0, j));
-  *value /= static_cast<Scalar>(q1.cols() / n);
+  *value /= static_cast<Scalar>(draws);
 }
 
 template <class Scalar>

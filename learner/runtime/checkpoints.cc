@@ -23,7 +23,8 @@ std::vector<std::string> Checkpoints::Newest() const {
 
 absl::Status Checkpoints::Save(std::uint64_t updates, const TensorFile& file) {
   std::error_code error;
-  std::filesystem::create_directories(folder_, error);
+  // Not the folder of the run: where that has gone, it was moved, and a new one would split the run.
+  std::filesystem::create_directory(folder_, error);
   RETURN_IF_ERROR(SaveTensors(file, absl::StrFormat("%s/%012d.safetensors", folder_, updates)));
   const std::vector<std::string> paths = Newest();
   for (std::size_t i = static_cast<std::size_t>(keep_); i < paths.size(); ++i)

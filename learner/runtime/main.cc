@@ -2,6 +2,7 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <filesystem>
 #include <string>
 
@@ -98,6 +99,16 @@ void WriteEvaluation(const EvaluationReport& report, MetricsSink* metrics) {
   if (!status.ok()) spdlog::error("metrics: {}", std::string(status.message()));
 }
 
+std::unique_ptr<Prefetcher> MakePrefetcher(const Config& config, const AlgorithmSpec& spec,
+                                           const BatchNeeds& needs, ReplayClient* draws) {
+  const TransitionLayout layout{spec.observation_size, spec.actions.width(), spec.actions.mask_width(),
+                                NeedsReturns(config.algorithm()) ? 1 : 0};
+  return std::make_unique<Prefetcher>(
+      draws, PrefetcherOptions{.counts = {needs.uniform, needs.plus, needs.minus},
+                               .layout = layout,
+                               .depth = static_cast<int>(config.learner().prefetch())});
+}
+
 absl::Status Serve(const Arguments& arguments, const Config& config) {
   RETURN_IF_ERROR(CheckBlasMemory(/*threads=*/2));  // the second network's, where the config asks for it
   const LearnerConfig& learner = config.learner();
@@ -110,18 +121,12 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
   ReplayClient draws(arguments.replay_address), labels(arguments.replay_address),
       stats(arguments.replay_address);
   const BatchNeeds needs = algorithm->needs();
-  const TransitionLayout layout{spec.observation_size, spec.actions.width(), spec.actions.mask_width(),
-                                NeedsReturns(config.algorithm()) ? 1 : 0};
   TrainerParts parts{.algorithm = std::move(algorithm),
                      .policy_service = &service,
                      .metrics = metrics.get(),
                      .saver = &saver,
-                     .prefetcher = nullptr,
+                     .prefetcher = MakePrefetcher(config, spec, needs, &draws),
                      .relabeller = std::make_unique<Relabeller>(&labels)};
-  parts.prefetcher = std::make_unique<Prefetcher>(
-      &draws, PrefetcherOptions{.counts = {needs.uniform, needs.plus, needs.minus},
-                                .layout = layout,
-                                .depth = static_cast<int>(learner.prefetch())});
   Trainer trainer(learner, std::move(parts));
   if (arguments.resume) RETURN_IF_ERROR(Resume(arguments.folder, learner, &trainer));
   RETURN_IF_ERROR(metrics->StartSession(static_cast<std::int64_t>(trainer.updates()), absl::Now()));

@@ -31,9 +31,11 @@ absl::Status Trainer::Load(const TensorFile& file) {
 absl::Status Trainer::Run() {
   last_record_ = last_checkpoint_ = MonotonicNow();
   updates_at_record_ = updates_;
+  const std::uint64_t updates_before = updates_;
   Publish();
   const End end = UpdateToTheEnd();
-  if (!end.state_is_sound) return end.status;  // the checkpoints before it stay
+  if (!end.state_is_sound) return end.status;                          // the checkpoints before it stay
+  if (updates_ == updates_before && !end.finished) return end.status;  // so does what was saved before
   Publish();
   const absl::Status saved = Save();
   if (!end.status.ok()) return end.status;

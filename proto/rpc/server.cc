@@ -1,14 +1,17 @@
 #include "proto/rpc/server.h"
 
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <netdb.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstring>
 #include <mutex>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
@@ -34,18 +37,41 @@ bool SocketIsServed(const std::string& path) {
   return served;
 }
 
-// gRPC does not say why it could not listen.
-absl::Status CannotListen(absl::string_view address) {
-  return absl::AlreadyExistsError(
-      absl::StrCat("cannot listen on ", address,
-                   ": the address is in use, or is none that this user may open on this machine. Stop the "
-                   "program that serves it or choose another address."));
-}
-
 absl::Status AddressInUse(absl::string_view address) {
   return absl::AlreadyExistsError(
       absl::StrCat("cannot listen on ", address,
                    ": the address is in use. Stop the program that serves it or choose another address."));
+}
+
+// Tries what gRPC has failed at: the reason, or 0 where it works now or cannot be tried.
+int WhyNotBound(const Address& address) {
+  addrinfo hints = {};
+  hints.ai_flags = AI_PASSIVE;
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  if (getaddrinfo(address.host.c_str(), absl::StrCat(address.port).c_str(), &hints, &found) != 0) return 0;
+  const absl::Cleanup free_found = [found] { freeaddrinfo(found); };
+  const int fd = socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (fd < 0) return errno;
+  const int yes = 1;
+  setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  const int why = bind(fd, found->ai_addr, found->ai_addrlen) == 0 ? 0 : errno;
+  close(fd);
+  return why;
+}
+
+// gRPC does not say why it could not listen. What another start would find again has a code that says so
+// (IsFinal).
+absl::Status CannotListen(const Address& address, absl::string_view text) {
+  const int why = address.is_unix() ? 0 : WhyNotBound(address);
+  if (why == EADDRINUSE) return AddressInUse(text);
+  const std::string message = absl::StrCat("cannot listen on ", text, ": ",
+                                           why == 0 ? "the system refused it for now" : std::strerror(why));
+  if (why == EADDRNOTAVAIL || why == EACCES) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        message, ". Choose an address of this machine that this user may open, or a unix socket."));
+  }
+  return absl::UnavailableError(message);
 }
 
 // Removes a socket that a killed server left at `path`, the reachable one of `address`.
@@ -98,7 +124,7 @@ absl::StatusOr<RunningServer> StartServer(const ServerOptions& options,
   builder.SetMaxReceiveMessageSize(kMaxMessageBytes);
   for (grpc::Service* service : services) builder.RegisterService(service);
   running.server = builder.BuildAndStart();
-  if (running.server == nullptr || port == 0) return CannotListen(options.address);
+  if (running.server == nullptr || port == 0) return CannotListen(address, options.address);
   running.address = options.address;
   if (!address.is_unix() && address.port == 0) {
     running.address = absl::StrCat(options.address.substr(0, options.address.rfind(':') + 1), port);

@@ -99,7 +99,7 @@ bool LabelSurvey::LookOn(const TransitionStore& store) {
 }
 
 LabelSummary LabelSurvey::Summarize() {
-  return SummarizeLabels(std::move(advantages_), std::move(ages_));
+  return SummarizeLabels(advantages_, std::move(ages_));
 }
 
 }  // namespace dbr

@@ -21,7 +21,7 @@ double RoundUp(double value) {
 
 }  // namespace
 
-LabelSummary SummarizeLabels(std::vector<float> advantages, std::vector<std::uint64_t> ages) {
+LabelSummary SummarizeLabels(const std::vector<float>& advantages, std::vector<std::uint64_t> ages) {
   LabelSummary summary;
   double largest = 0;
   for (const float advantage : advantages)

@@ -38,8 +38,8 @@ struct LabelSummary {
   std::vector<std::uint64_t> histogram;
 };
 
-// Summarizes the advantages of n judged rows, and their ages in critic versions. Consumes both. O(n).
-LabelSummary SummarizeLabels(std::vector<float> advantages, std::vector<std::uint64_t> ages);
+// Summarizes the advantages of n judged rows, and their ages in critic versions. Consumes the ages. O(n).
+LabelSummary SummarizeLabels(const std::vector<float>& advantages, std::vector<std::uint64_t> ages);
 
 // All statistics of a buffer at one time. Counts are rows unless they say otherwise.
 struct BufferStats {

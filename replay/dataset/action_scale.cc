@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
+#include "core/json_text.h"
 
 namespace dbr {
 namespace {
@@ -48,9 +49,9 @@ absl::StatusOr<ActionScale> ActionScale::FromSpace(const std::string& text, int 
                      " numbers, which are scaled to [-1, 1], found ", found,
                      "; scale the actions to [-1, 1] and write these bounds, or none"));
   };
-  const json space = json::parse(absl::StrReplaceAll(text, {{"Infinity", "1e300"}}), nullptr,
-                                 /*allow_exceptions=*/false);
-  if (!space.is_object()) return refuse(absl::StrCat("'", text.substr(0, 60), "'"));
+  const absl::StatusOr<json> parsed = ParseJson(absl::StrReplaceAll(text, {{"Infinity", "1e300"}}));
+  if (!parsed.ok() || !parsed->is_object()) return refuse(absl::StrCat("'", text.substr(0, 60), "'"));
+  const json& space = *parsed;
   if (space.value("type", json()) != "Box")
     return refuse(absl::StrCat("a space of type ", space.value("type", json()).dump()));
   const auto low = Numbers(space, "low"), high = Numbers(space, "high");

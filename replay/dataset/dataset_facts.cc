@@ -4,20 +4,26 @@
 
 namespace dbr {
 
-std::vector<std::string> WarningsOf(const DatasetFacts& facts) {
+std::vector<std::string> DataWarnings(const WarningCounts& counts) {
   std::vector<std::string> warnings;
-  if (facts.transitions > 0 && facts.episodes == 0) {
+  if (counts.transitions > 0 && counts.episodes == 0) {
     warnings.emplace_back(
         "no episode ends in the file: no flag is 1, as if all rows were one episode without an end. Are the "
         "ends lost, or under another key?");
   }
-  if (facts.actions_outside > 0) {
-    warnings.push_back(absl::StrCat(facts.actions_outside,
+  if (counts.actions_outside > 0) {
+    warnings.push_back(absl::StrCat(counts.actions_outside,
                                     " rows have actions outside [-1, 1], the range of the environments; they "
                                     "are taken as they are. Were ",
                                     "they recorded with other bounds?"));
   }
   return warnings;
+}
+
+std::vector<std::string> WarningsOf(const DatasetFacts& facts) {
+  return DataWarnings({.transitions = static_cast<std::uint64_t>(facts.transitions),
+                       .episodes = static_cast<std::uint64_t>(facts.episodes),
+                       .actions_outside = static_cast<std::uint64_t>(facts.actions_outside)});
 }
 
 }  // namespace dbr

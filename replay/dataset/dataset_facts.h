@@ -27,8 +27,18 @@ struct DatasetFacts {
   double return_max = std::numeric_limits<double>::quiet_NaN();
 };
 
+// What the warnings are made of.
+struct WarningCounts {
+  std::uint64_t transitions = 0;
+  std::uint64_t episodes = 0;         // that ended
+  std::uint64_t actions_outside = 0;  // rows
+};
+
 // What a user should know before the data is trained on, one sentence or two each: that no episode ends, that
-// actions lie outside the range. Call it when all is read.
+// actions lie outside the range. For counts of all that was read.
+std::vector<std::string> DataWarnings(const WarningCounts& counts);
+
+// The same of a file. Call it when all is read.
 std::vector<std::string> WarningsOf(const DatasetFacts& facts);
 
 }  // namespace dbr

@@ -136,9 +136,11 @@ absl::Status DatasetReader::State::RefuseBadRows() {
   }
   TakeFaults();
   const RowFaults faults = source->faults();
-  const std::string flags = faults.bad_flags == 0 ? ""
-                                                  : absl::StrCat(" (in ", faults.bad_flags,
-                                                                 " of them a flag that is neither 0 nor 1)");
+  const std::string flags =
+      faults.bad_flags == 0
+          ? ""
+          : absl::StrCat(" (in ", faults.bad_flags,
+                         " of them a flag that is neither 0 nor 1, or that another flag contradicts)");
   return absl::InvalidArgumentError(absl::StrCat(
       file.path(), ": expected finite numbers",
       faults.bad_flags == 0 ? ", found NaN or infinity in " : " and flags of 0 or 1, found other values in ",

@@ -139,7 +139,10 @@ struct DatasetWriter::State {
 absl::Status DatasetWriter::State::Create() {
   SilenceHdf5();
   ASSIGN_OR_RETURN(file_on_disk, TemporaryFile::Create(path));
-  file = Hdf5Id(H5Fcreate(file_on_disk->name().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
+  // The temporary file has a lock of its own, and on a network file system HDF5's would be refused for it.
+  const Hdf5Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5Pset_file_locking(access.get(), /*use_file_locking=*/false, /*ignore_when_disabled=*/true);
+  file = Hdf5Id(H5Fcreate(file_on_disk->name().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get()), H5Fclose);
   if (!file.ok()) return WriteError(path, "create");
   boolean = BooleanType();
   if (!WriteText(file.get(), "layout", DatasetLayoutName(options.layout)) ||

@@ -120,6 +120,18 @@ absl::Status CheckFilters(hid_t creation, const std::string& path, const std::st
   return absl::OkStatus();
 }
 
+// Whether an array stored in chunks lacks some of them: reading gives zeros in their place.
+bool MissesChunks(hid_t array, hid_t creation) {
+  if (H5Pget_layout(creation) != H5D_CHUNKED) return false;
+  const Hdf5Id space(H5Dget_space(array), H5Sclose);
+  std::array<hsize_t, H5S_MAX_RANK> sizes, chunk;
+  const int rank = space.ok() ? H5Sget_simple_extent_dims(space.get(), sizes.data(), nullptr) : -1;
+  if (rank <= 0 || H5Pget_chunk(creation, rank, chunk.data()) != rank) return false;
+  hsize_t expected = 1, found = 0;
+  for (int i = 0; i < rank; ++i) expected *= (sizes[i] + chunk[i] - 1) / chunk[i];
+  return H5Dget_num_chunks(array, space.get(), &found) >= 0 && found < expected;
+}
+
 }  // namespace
 
 absl::Status OpenFailure(const std::string& path) {
@@ -176,10 +188,12 @@ absl::Status CheckStorage(hid_t array, const std::string& path, const std::strin
   if (H5Pget_layout(creation.get()) == H5D_VIRTUAL) return absl::OkStatus();
   H5D_space_status_t space = H5D_SPACE_STATUS_ALLOCATED;
   H5Dget_space_status(array, &space);
-  if (space != H5D_SPACE_STATUS_NOT_ALLOCATED) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(path, ": expected values in '", name,
-                                                 "', found an array that nothing was written into; was ",
-                                                 "its writer stopped?"));
+  const bool empty = space == H5D_SPACE_STATUS_NOT_ALLOCATED;
+  if (!empty && !MissesChunks(array, creation.get())) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(path, ": expected values in '", name, "', found an array ",
+                   empty ? "that nothing was written into" : "of which a part was never written",
+                   "; was its writer stopped?"));
 }
 
 }  // namespace dbr

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/file_io.h"
+#include "core/json_text.h"
 #include "core/status_macros.h"
 
 namespace dbr {
@@ -22,8 +23,8 @@ std::string TextOf(const nlohmann::json& json, const char* key) {
 absl::StatusOr<std::string> FindDataFile(const std::string& path) {
   std::error_code ignored;
   if (!std::filesystem::is_directory(path, ignored)) return path;
-  for (const std::filesystem::path folder :
-       {std::filesystem::path(path) / "data", std::filesystem::path(path)}) {
+  const std::filesystem::path dataset(path);
+  for (const std::filesystem::path& folder : {dataset / "data", dataset}) {
     if (std::filesystem::exists(folder / kMainFile, ignored)) return (folder / kMainFile).string();
   }
   return absl::InvalidArgumentError(
@@ -40,12 +41,13 @@ absl::StatusOr<MinariMetadata> ReadMinariMetadata(const Hdf5File& file) {
   const absl::StatusOr<std::string> text = ReadFile(beside);
   if (absl::IsNotFound(text.status())) return metadata;
   RETURN_IF_ERROR(text.status());
-  const nlohmann::json json = nlohmann::json::parse(*text, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object()) {
+  const absl::StatusOr<nlohmann::json> parsed = ParseJson(*text);
+  if (!parsed.ok() || !parsed->is_object()) {
     return absl::InvalidArgumentError(absl::StrCat(
         beside, ": expected a JSON object, as Minari writes it, found something else; restore it, ",
         "or take it away"));
   }
+  const nlohmann::json& json = *parsed;
   metadata.is_minari = metadata.is_minari || json.contains("minari_version") || json.contains("data_format");
   if (std::string space = TextOf(json, "action_space"); !space.empty())
     metadata.action_space = std::move(space);

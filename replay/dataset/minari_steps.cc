@@ -1,10 +1,10 @@
 // Layout minari: groups episode_0, episode_1, ... with observations [T + 1], actions, rewards, terminations
 // and truncations [T].
 #include <algorithm>
-#include <compare>
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -36,7 +36,9 @@ struct EpisodeGroup {
   std::int64_t number = 0;
   std::string name;
 
-  auto operator<=>(const EpisodeGroup&) const = default;
+  bool operator<(const EpisodeGroup& other) const {
+    return std::tie(number, name) < std::tie(other.number, other.name);
+  }
 };
 
 absl::Status CheckKeys(const Hdf5File& file, const std::string& group) {

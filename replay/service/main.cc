@@ -50,11 +50,9 @@ void LogSeedBuffer(const std::string& path, const SeedBufferRecord& seed_buffer)
     spdlog::warn(
         "seed buffer {}: {} bad rows (a value is not finite, or a flag neither 0 nor 1) are left out", path,
         seed_buffer.bad_rows);
-  DatasetFacts facts;
-  facts.transitions = static_cast<std::int64_t>(seed_buffer.rows);
-  facts.episodes = static_cast<std::int64_t>(seed_buffer.episodes);
-  facts.actions_outside = static_cast<std::int64_t>(seed_buffer.actions_outside);
-  for (const std::string& warning : WarningsOf(facts)) spdlog::warn("seed buffer {}: {}", path, warning);
+  for (const std::string& warning :
+       DataWarnings({seed_buffer.rows, seed_buffer.episodes, seed_buffer.actions_outside}))
+    spdlog::warn("seed buffer {}: {}", path, warning);
 }
 
 absl::Status Serve(const ServiceArguments& arguments, const Config& config) {

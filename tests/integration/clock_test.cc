@@ -50,7 +50,8 @@ TEST_P(ClockTest, ARunEndsAtItsLimitAndSavesThoughTheTimeOfDayJumps) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "AddressSanitizer must be loaded before other libraries";
 #endif
-  DbrProcess launch("dbr", {"launch", SmallConfig(), "--run-dir", run_.root, "--set", "launch.max_seconds=6"},
+  DbrProcess launch("dbr",
+                    {"launch", SmallConfig(), "--run-dir", run_.root, "--set", "launch.max_seconds=12"},
                     time_of_day_.Environment());
   ASSERT_TRUE(launch.Await([&] { return Counter(run_, "relabelled") > 0; })) << launch.output();
   time_of_day_.Jump(absl::Hours(GetParam()));
@@ -61,7 +62,7 @@ TEST_P(ClockTest, ARunEndsAtItsLimitAndSavesThoughTheTimeOfDayJumps) {
   EXPECT_EQ(summary["restarts"], 0);
   // Seconds; on a machine that is slow beyond measure they grow, but not to the hours of the jump.
   for (const char* measured : {"training_s", "wall_s"}) {
-    EXPECT_GE(summary[measured], 6) << measured;
+    EXPECT_GE(summary[measured], 12) << measured;
     EXPECT_LT(summary[measured], 3600) << measured;
   }
   EXPECT_EQ(summary["final"].size(), 1);

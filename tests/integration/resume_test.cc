@@ -83,6 +83,8 @@ TEST_F(ResumeTest, ARunWhoseFolderIsMovedEndsAndSaysSo) {
   EXPECT_EQ(launch.Wait(), 1);
   EXPECT_THAT(launch.output(), HasSubstr("was moved or removed while the run was at work"));
   EXPECT_THAT(ProcessesOf("dbr", run_.root), IsEmpty());
+  EXPECT_FALSE(std::filesystem::exists(run_.root)) << "nobody makes it anew";
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "moved/summary.json"));
 }
 
 // What stands in the place of the folder of checkpoints, or of the summary, keeps them from being written.
@@ -90,7 +92,7 @@ TEST_F(ResumeTest, ARunThatCannotSaveItsEndHasFailed) {
   for (const bool checkpoints : {true, false}) {
     const RunFolder run{folder_ / (checkpoints ? "no-checkpoints" : "no-summary")};
     DbrProcess launch("dbr",
-                      {"launch", SmallConfig(), "--run-dir", run.root, "--set", "launch.max_seconds=6"});
+                      {"launch", SmallConfig(), "--run-dir", run.root, "--set", "launch.max_steps=80000"});
     ASSERT_TRUE(launch.Await([&] { return Counter(run, "relabelled") > 0; })) << launch.output();
     if (checkpoints) {
       std::filesystem::rename(run.checkpoints(), run.root + "/aside");

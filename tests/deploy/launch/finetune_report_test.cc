@@ -219,7 +219,7 @@ TEST(SeedBufferWarningsTest, TellOfEpisodesWithoutEndAndActionsOutsideTheRange) 
   sample.replay->set_seed_buffer_actions_outside(1234);
   summary.Update(sample);
   EXPECT_THAT(SeedBufferWarnings(summary.seed_buffer),
-              ElementsAre(HasSubstr("no episode ends in the seed buffer"), HasSubstr("1,234 rows")));
+              ElementsAre(HasSubstr("warning: seed buffer: no episode ends"), HasSubstr("1234 rows")));
 }
 
 TEST(SeedBufferWarningsTest, TheSummaryKeepsTheCountOfActionsOutside) {

@@ -78,6 +78,8 @@ TEST_F(RunPlanTest, GivesTwoRunsOfOneNameFoldersOfTheirOwn) {
 
 TEST_F(RunPlanTest, RefusesAFolderThatExistsWithoutResume) {
   ASSERT_TRUE(PrepareRun(Options(), kNow).ok());
+  ASSERT_TRUE(PrepareRun(Options(), kNow).ok()) << "nothing has begun yet";
+  MakeStore();
   const auto again = PrepareRun(Options(), kNow);
   EXPECT_EQ(again.status().code(), absl::StatusCode::kAlreadyExists);
   EXPECT_THAT(std::string(again.status().message()), AllOf(HasSubstr(run_), HasSubstr("--resume")));

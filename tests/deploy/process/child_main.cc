@@ -6,6 +6,7 @@
 //   ignore-sigterm
 //   wait FILE NAME   waits for SIGTERM, appends NAME to FILE and exits with 0
 //   wait-and-interrupt-parent   answers SIGTERM with a SIGINT to its parent, and stays
+//   wait-and-interrupt-parent-once   the same, and exits with 0
 #include <fcntl.h>
 #include <signal.h>
 #include <unistd.h>
@@ -59,6 +60,10 @@ int main(int argc, char** argv) {
       WaitFor(SIGTERM);
       kill(getppid(), SIGINT);
       for (;;) pause();
+    } else if (order == "wait-and-interrupt-parent-once") {
+      WaitFor(SIGTERM);
+      kill(getppid(), SIGINT);
+      return 0;
     }
   }
   return 0;

@@ -257,13 +257,12 @@ TEST_F(SupervisorTest, AnotherSignalKillsTheChildThatIsWaitedFor) {
 // A run that comes to its limit stops without a signal: the first Ctrl-C asks for what is being done.
 TEST_F(SupervisorTest, TheFirstSignalKillsNobodyWhereAllIsBeingStoppedAlready) {
   const auto supervisor = Make();
-  ProcessSpec spec = Child("learner", {"wait-and-interrupt-parent"});
-  spec.stop_grace = absl::Milliseconds(300);
+  ProcessSpec spec = Child("learner", {"wait-and-interrupt-parent-once"});
+  spec.stop_grace = absl::Hours(1);
   ASSERT_TRUE(supervisor->Start(spec).ok());
-  EXPECT_FALSE(supervisor->Stop());
+  EXPECT_TRUE(supervisor->Stop());
   EXPECT_EQ(supervisor->stop_signals(), 1);
-  EXPECT_THAT(events_, ElementsAre(HasSubstr("another signal kills"),
-                                   HasSubstr("still there 300ms after SIGTERM"), HasSubstr("signal 9")));
+  EXPECT_THAT(events_, ElementsAre(HasSubstr("another signal kills")));
 }
 
 // As under nohup, and in the background of a script.

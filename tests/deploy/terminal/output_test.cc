@@ -6,6 +6,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <string>
 
 #include "core/file_io.h"
@@ -84,6 +85,21 @@ TEST(OutputTest, EndsThoughItsReaderNeverReads) {
   const Pipe pipe;
   Output out(pipe.writer());
   out.Write(std::string(100'000, 'x'));
+}
+
+// A terminal that is ready for a byte need not take a whole text, and a write of it would block.
+TEST(OutputTest, EndsThoughItsTerminalIsFrozen) {
+  const int screen = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+  ASSERT_EQ(grantpt(screen), 0);
+  ASSERT_EQ(unlockpt(screen), 0);
+  const int terminal = open(ptsname(screen), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  {
+    Output out(terminal);
+    for (int i = 0; i < 50; ++i) out.Write(std::string(601, 'x'));
+    EXPECT_TRUE(out.behind());
+  }
+  close(terminal);
+  close(screen);
 }
 
 TEST(OutputTest, DropsWhatNobodyCanRead) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <map>
 #include <thread>
 
@@ -244,6 +245,16 @@ TEST_F(TrainerTest, TellsHowFarItIsThoughItPushesSeldom) {
   EXPECT_GT(status.updates(), 0u);
   trainer->Stop();
   thread.join();
+}
+
+// What stands there may be worth more: a run that is resumed without its checkpoints and stopped at once.
+TEST_F(TrainerTest, SavesNothingWhereItHasMadeNoUpdate) {
+  const auto trainer = MakeTrainer(/*max_updates=*/0);
+  trainer->Stop();
+  EXPECT_TRUE(trainer->Run().ok());
+  EXPECT_FALSE(std::filesystem::exists(RunFolder{folder_.path()}.latest_policy()));
+  EXPECT_TRUE(
+      absl::IsNotFound(Checkpoints(RunFolder{folder_.path()}.checkpoints(), 3).LoadNewest().status()));
 }
 
 TEST_F(TrainerTest, SavesWhatIsSoundWhereTheReplayIsGoneForGood) {

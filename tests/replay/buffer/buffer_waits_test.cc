@@ -126,23 +126,23 @@ TEST_F(Buffer, CloseWakesAnInsertThatWaits) {
   buffer_options_.limiter = {.samples_per_insert = 1, .tolerance = 10, .min_size = 10};
   Make();
   ASSERT_FALSE(Insert(1, 100).ok());
-  const absl::Time patience = absl::Now() + absl::Seconds(20);  // only a failure waits that long
+  const absl::Time patience = MonotonicNow() + absl::Seconds(20);  // only a failure waits that long
   std::thread writer([&] { EXPECT_EQ(Insert(500, 10, 1, patience).code(), absl::StatusCode::kUnavailable); });
-  while (Waiting(*buffer_, "insert") == 0 && absl::Now() < patience) std::this_thread::yield();
+  while (Waiting(*buffer_, "insert") == 0 && MonotonicNow() < patience) std::this_thread::yield();
   buffer_->Close();
   writer.join();
-  EXPECT_LT(absl::Now(), patience) << "the deadline ended the wait, and not Close";
+  EXPECT_LT(MonotonicNow(), patience) << "the deadline ended the wait, and not Close";
   EXPECT_EQ(buffer_->OpenWriter({.id = 5, .name = "late"}).status().code(), absl::StatusCode::kUnavailable);
 }
 
 TEST_F(Buffer, CloseWakesDrawsThatWaitAndRefusesLaterOnes) {
   Make();
-  const absl::Time patience = absl::Now() + absl::Seconds(20);
+  const absl::Time patience = MonotonicNow() + absl::Seconds(20);
   std::thread early([&] { EXPECT_EQ(Draw(1, 0, 0, true, patience).code(), absl::StatusCode::kUnavailable); });
-  while (Waiting(*buffer_, "sample") == 0 && absl::Now() < patience) std::this_thread::yield();
+  while (Waiting(*buffer_, "sample") == 0 && MonotonicNow() < patience) std::this_thread::yield();
   buffer_->Close();
   early.join();
-  EXPECT_LT(absl::Now(), patience) << "the deadline ended the wait, and not Close";
+  EXPECT_LT(MonotonicNow(), patience) << "the deadline ended the wait, and not Close";
   EXPECT_EQ(Draw(1, 0, 0, true, patience).code(), absl::StatusCode::kUnavailable);
 }
 

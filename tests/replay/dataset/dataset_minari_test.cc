@@ -130,6 +130,7 @@ TEST_F(DatasetMinariTest, SpacesThatCannotBeScaledAreRefusedWithTheReason) {
       {Box("[NaN, -1.0]", "[1.0, 1.0]"), "found '{"},
       {Box("[[-1.0, -1.0]]", "[[1.0, 1.0]]"), "none that are a list of numbers"},
       {R"({"type": "Box"})", "none that are a list of numbers"},
+      {R"({"type": )" + std::string(10'000, '[') + std::string(10'000, ']') + "}", "found '{"},
       {"Box(-1, 1)", "found 'Box(-1, 1)'"}};
   for (const auto& [space, found] : spaces) {
     SCOPED_TRACE(space);

@@ -131,6 +131,18 @@ TEST_F(DatasetTroubleTest, DictSpacesAreRefusedWithTheirKeys) {
                     HasSubstr("dicts")));
 }
 
+// As a writer leaves it that made the array in full and was stopped half way.
+TEST_F(DatasetTroubleTest, AnArrayOfWhichAPartWasNeverWrittenIsNotReadAsZeros) {
+  const hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
+  const hsize_t rows_of_a_chunk = 10, start = 0;
+  H5Pset_chunk(creation, 1, &rows_of_a_chunk);
+  const hid_t array = MakeRewards(WriteWithoutRewards(), creation);
+  ASSERT_GE(H5Dwrite_chunk(array, H5P_DEFAULT, 0, &start, 4 * rows_of_a_chunk, columns_.rewards.data()), 0);
+  H5Dclose(array);
+  file_.reset();
+  EXPECT_THAT(Message(), AllOf(HasSubstr("'rewards'"), HasSubstr("a part was never written")));
+}
+
 TEST_F(DatasetTroubleTest, AnArrayThatNothingWasWrittenIntoIsNotReadAsZeros) {
   H5Dclose(MakeRewards(WriteWithoutRewards(), H5Pcreate(H5P_DATASET_CREATE)));
   file_.reset();
