@@ -10,9 +10,12 @@
 #include <utility>
 #include <vector>
 
-#include "absl/strings/match.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "absl/strings/string_view.h"
 #include "core/check.h"
+#include "core/file_io.h"
 #include "core/status_macros.h"
 #include "core/temporary_file.h"
 #include "replay/dataset/hdf5_id.h"
@@ -24,9 +27,12 @@ constexpr hsize_t kChunkRows = 8192;  // a whole number of them makes a stretch 
 
 absl::Status WriteError(const std::string& path, absl::string_view what) {
   const std::string reason = Hdf5Reason();
-  const std::string message = absl::StrCat("cannot ", what, " ", path, ": ", reason);
-  if (absl::StrContains(reason, "No space left")) return absl::ResourceExhaustedError(message);
-  return absl::InternalError(message);
+  // HDF5 tells of a failed write in a line of numbers, among them the system's error.
+  const std::vector<absl::string_view> parts = absl::StrSplit(reason, absl::MaxSplits("errno = ", 1));
+  int error_number = 0;
+  if (parts.size() == 2 && absl::SimpleAtoi(parts[1].substr(0, parts[1].find(',')), &error_number))
+    return ErrnoStatus(error_number, absl::StrCat("cannot ", what), path);
+  return absl::InternalError(absl::StrCat("cannot ", what, " ", path, ": ", reason));
 }
 
 // Truth values as h5py has them, so that Python reads them as bool.

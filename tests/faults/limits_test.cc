@@ -56,7 +56,7 @@ TEST(LimitsTest, AFileOfLimitedSizeIsAnError) {
       Under("-f 10",
             absl::StrCat("dataset record --env hopper --quality random --steps 5000 --out ", folder / "h"));
   EXPECT_EQ(recorded, 1) << message;
-  EXPECT_THAT(message, HasSubstr("File too large"));
+  EXPECT_THAT(message, HasSubstr("/h: File too large. Raise the limit of `ulimit -f`"));
 }
 
 }  // namespace
