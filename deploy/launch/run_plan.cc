@@ -131,8 +131,9 @@ absl::Status CheckEpisodes(const char* field, std::uint32_t episodes) {
 }
 
 absl::Status CheckRunFolder(const RunFolder& folder) {
-  std::error_code unreadable;
-  if (std::filesystem::exists(folder.config(), unreadable)) return absl::OkStatus();
+  std::error_code error;
+  if (std::filesystem::exists(folder.config(), error)) return absl::OkStatus();
+  if (error) return ErrnoStatus(error.value(), "--resume: cannot look at", folder.config());
   return absl::NotFoundError(absl::StrCat("--resume: '", folder.root,
                                           "' is no run folder: it has no config.textproto. ",
                                           "Name the folder that an earlier launch printed."));
@@ -141,9 +142,7 @@ absl::Status CheckRunFolder(const RunFolder& folder) {
 absl::Status CheckResumable(const RunFolder& folder, const Config& config) {
   ASSIGN_OR_RETURN(const Config before, LoadConfig(folder.config()));
   if (const absl::Status read = LoadSummary(folder).status(); !read.ok() && !absl::IsNotFound(read)) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "--resume: ", read.message(), ". Restore the file, or remove it: the run then counts its ",
-        "seconds, restarts and evaluations from nothing."));
+    return absl::FailedPreconditionError(absl::StrCat("--resume: ", read.message()));
   }
   const absl::Status same = CheckSameRun(before, config);
   if (same.ok()) return same;

@@ -109,9 +109,10 @@ std::string FoundInPlaceOfEnding(const Json& json) {
 }
 
 absl::Status Damaged(const RunFolder& folder, absl::string_view found) {
-  return absl::DataLossError(
-      absl::StrCat(folder.summary(), " is damaged: expected a JSON object that says how the run 'ended', ",
-                   found, ". Run the cell again, or restore the file."));
+  return absl::DataLossError(absl::StrCat(
+      folder.summary(), " is damaged: expected a JSON object that says how the run 'ended', ", found,
+      ". Restore the file, or remove it: the run then counts its seconds, restarts and evaluations from "
+      "nothing."));
 }
 
 void ReadCounters(const Json& json, RunSummary* summary) {
