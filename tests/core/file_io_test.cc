@@ -59,7 +59,8 @@ TEST(FileIoTest, WhatIsNoFileIsRefusedAtOnceAndNamed) {
     const absl::Status status = ReadFile(path).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
     EXPECT_THAT(std::string(status.message()), HasSubstr(path + ": expected a file, found " + kind));
-    if (path != pipe) EXPECT_EQ(ReadTextFile(path).status(), status);
+    if (path == pipe) continue;  // a text may come through one
+    EXPECT_EQ(ReadTextFile(path).status(), status);
   }
 }
 
