@@ -1,21 +1,18 @@
-// Tests what every algorithm of the registry must do, and that DBR solves small problems with known answers.
+// Tests what every algorithm of the registry must do.
 #include "learner/algorithm.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
 #include <cstdlib>
 
 #include "absl/strings/match.h"
-#include "learner/algorithms/discrete_dbr.h"
 #include "learner/algorithms/registry.h"
 #include "learner/training/learning_rate.h"
 #include "nn/policy.h"
 #include "tests/learner/algorithms/allocation_count.h"
 #include "tests/learner/algorithms/batches.h"
-#include "tests/learner/algorithms/tiny_problem.h"
 
 namespace dbr {
 namespace {
@@ -305,122 +302,6 @@ TEST(Registry, RefusesAnActionSpaceThatTheAlgorithmDoesNotServe) {
   EXPECT_THAT(
       std::string(MakeAlgorithm(spec).status().message()),
       testing::ContainsRegex("serves the discrete actions of environment 'test' \\(dbr.*\\), found sac$"));
-}
-
-TEST(Registry, OverDiscreteActionsAllThreeMmdsAreOne) {
-  TensorFile states[3];
-  for (int i = 0; i < 3; ++i) {
-    AlgorithmSpec spec = SmallSpec();
-    spec.config.mutable_dbr()->set_divergence(
-        std::array{DbrConfig::MMD_EXACT, DbrConfig::MMD_LAPLACIAN, DbrConfig::MMD_GAUSSIAN}[i]);
-    const auto algorithm = MakeAlgorithm(spec);
-    ASSERT_TRUE(algorithm.ok()) << algorithm.status();
-    Rng rng(4);
-    const Batch uniform = RandomBatch<float>(spec, 16, rng), plus = RandomBatch<float>(spec, 16, rng);
-    ASSERT_TRUE((*algorithm)->Update({uniform, plus, plus}).ok());
-    (*algorithm)->Save(&states[i]);
-  }
-  EXPECT_EQ(states[0].tensors, states[1].tensors);
-  EXPECT_EQ(states[0].tensors, states[2].tensors);
-}
-
-// Observations far from 0 and at another scale give the same results, except for rounding.
-TEST(Normalized, TheScaleOfObservationsDoesNotMatter) {
-  std::vector<float> policies[2];
-  for (const int variant : {0, 1}) {
-    AlgorithmSpec spec = SmallSpec(1, ActionKind::kContinuous);
-    spec.config.mutable_sac();
-    spec.normalize_observations = true;
-    const auto algorithm = MakeAlgorithm(spec);
-    ASSERT_TRUE(algorithm.ok());
-    Rng rng(3);
-    for (int i = 0; i < 5; ++i) {
-      Batch batch = RandomBatch<float>(spec, 16, rng);
-      if (variant == 1) {
-        batch.observations = (8 * batch.observations.array() + 3).matrix().eval();
-        batch.next_observations = (8 * batch.next_observations.array() + 3).matrix().eval();
-      }
-      ASSERT_TRUE((*algorithm)->Update({batch, batch, batch}).ok());
-    }
-    PolicySnapshot snapshot;
-    (*algorithm)->ExportPolicy(&snapshot);
-    policies[variant] = *snapshot.Find(kPolicyNetwork);
-    const std::vector<float>& statistics = *snapshot.Find(kObservationNormalizer);
-    ASSERT_EQ(statistics.size(), 10u);
-    EXPECT_NEAR(statistics[0], variant == 1 ? 3 : 0,
-                variant == 1 ? 1.6 : 0.2);  // within the error of the mean of 80 uniform draws
-    EXPECT_NEAR(statistics[5], std::sqrt(3.0) / (variant == 1 ? 8 : 1), 0.3);
-  }
-  for (std::size_t i = 0; i < policies[0].size(); ++i) EXPECT_NEAR(policies[0][i], policies[1][i], 1e-4);
-}
-
-TEST(Normalized, ActingTakesTheStatisticsAlong) {
-  AlgorithmSpec spec = SmallSpec(1, ActionKind::kContinuous);
-  spec.config.mutable_sac();
-  spec.normalize_observations = true;
-  const auto algorithm = MakeAlgorithm(spec);
-  Rng rng(3);
-  const Batch batch = RandomBatch<float>(spec, 16, rng);
-  ASSERT_TRUE((*algorithm)->Update({batch, batch, batch}).ok());
-  PolicySnapshot with;
-  (*algorithm)->ExportPolicy(&with);
-  PolicySnapshot without = with;
-  without.networks.pop_back();  // removes the statistics
-  const auto act = [&](const PolicySnapshot& snapshot, const MatrixX<float>& observations) {
-    PolicyRunner runner;
-    MatrixX<float> actions(2, observations.cols());
-    const auto policy = PolicyNetworks::Create(snapshot);
-    EXPECT_TRUE(runner.Act(**policy, MODE, observations, MatrixX<float>(0, 16), rng, actions).ok());
-    return actions;
-  };
-  const std::vector<float>& statistics = *with.Find(kObservationNormalizer);
-  const Eigen::Map<const VectorX<float>> mean(statistics.data(), 5), scale(statistics.data() + 5, 5);
-  const MatrixX<float> by_hand =
-      ((batch.observations.colwise() - mean).array().colwise() * scale.array()).matrix();
-  EXPECT_TRUE(act(with, batch.observations).isApprox(act(without, by_hand), 1e-5f));
-  EXPECT_FALSE(act(with, batch.observations).isApprox(act(without, batch.observations), 1e-3f));
-}
-
-TEST(DiscreteDbr, WarmStartLeavesQOut) {
-  // Policies whose critics see different data stay equal while Q is left out.
-  std::vector<float> policies[2];
-  for (const int variant : {0, 1}) {
-    AlgorithmSpec spec = SmallSpec();
-    spec.config.mutable_dbr()->set_warm_start_updates(3);
-    DiscreteDbr<float> dbr(spec);
-    Rng rng(3);
-    for (int i = 0; i < 3; ++i) {
-      Batch batch = RandomBatch<float>(spec, 16, rng);
-      const Batch behavior = batch;
-      batch.rewards *= static_cast<float>(1 + 10 * variant);
-      ASSERT_TRUE(dbr.Update(batch, behavior, behavior).ok());
-    }
-    PolicySnapshot snapshot;
-    dbr.ExportPolicy(&snapshot);
-    policies[variant] = *snapshot.Find(kPolicyNetwork);
-  }
-  EXPECT_EQ(policies[0], policies[1]);
-}
-
-using DiscreteDbrTinyProblem = TinyProblem;
-
-TEST_F(DiscreteDbrTinyProblem, TheTwoBehavioursOfABanditSeparate) {
-  Train(Bandit(), 1, 3, 600);
-  EXPECT_GT(view_.policy(1, 0), 0.9f);
-  EXPECT_GT(view_.beta_plus(1, 0), 0.9f);
-  EXPECT_LT(view_.beta_minus(1, 0), 0.2f);
-  EXPECT_NEAR(view_.q(1, 0), 1, 0.05);
-  EXPECT_NEAR(view_.q(0, 0), 0, 0.05);
-}
-
-TEST_F(DiscreteDbrTinyProblem, ATwoStateChainHasItsClosedFormValues) {
-  Train(Chain(), 2, 2, 1500);
-  EXPECT_NEAR(view_.q(0, 1), 1, 0.05);
-  EXPECT_NEAR(view_.q(1, 1), -1, 0.05);
-  EXPECT_NEAR(view_.q(0, 0), 0.9, 0.05);
-  EXPECT_NEAR(view_.q(1, 0), 0.3, 0.05);
-  EXPECT_GT(view_.policy(0, 0), 0.9f);
-  EXPECT_GT(view_.policy(0, 1), 0.9f);
 }
 
 }  // namespace

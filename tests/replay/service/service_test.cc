@@ -7,12 +7,10 @@
 #include <thread>
 
 #include "absl/strings/str_cat.h"
-#include "core/stop_flag.h"
 #include "proto/rpc/channel.h"
 #include "proto/rpc/codec.h"
 #include "proto/rpc/grpc_status.h"
 #include "proto/rpc/server.h"
-#include "replay/client/await_stats.h"
 #include "replay/client/client.h"
 #include "replay/client/writer.h"
 #include "replay/service/replay_server.h"
@@ -298,30 +296,6 @@ TEST_F(ReplayOverSocket, StatsTellWhoIsBlockedAndWhy) {
   DrawnBatches drawn;
   EXPECT_EQ(client.Sample({.uniform = 8}, kSmallLayout, kPatience, &drawn).code(),
             absl::StatusCode::kCancelled);
-}
-
-TEST_F(ReplayOverSocket, StatisticsAreAwaitedUntilThereIsAServer) {
-  const StopFlag never;
-  std::thread process([&] {
-    ReplayClient client(options_.server.address);
-    const auto stats = AwaitStats(&client, "for this test", never);
-    EXPECT_TRUE(stats.ok() && stats->capacity() == 10000) << stats.status();
-  });
-  StartServer();
-  process.join();
-}
-
-TEST_F(ReplayOverSocket, AwaitingStatisticsEndsWithTheProcessAndBeforeAnotherProgram) {
-  ReplayClient client(options_.server.address);
-  StopFlag stopping;
-  std::thread process(
-      [&] { EXPECT_TRUE(absl::IsCancelled(AwaitStats(&client, "for this test", stopping).status())); });
-  stopping.Set();
-  process.join();
-  const auto another = dbr::StartServer(options_.server, {});
-  ASSERT_TRUE(another.ok()) << another.status();
-  const StopFlag never;
-  EXPECT_TRUE(absl::IsUnimplemented(AwaitStats(&client, "for this test", never).status()));
 }
 
 TEST_F(ReplayOverSocket, StoppingAnswersADrawThatWaits) {
