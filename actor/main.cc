@@ -13,7 +13,7 @@
 #include "core/standard_streams.h"
 #include "deploy/manual/man_page.h"
 #include "deploy/manual/number_option.h"
-#include "nn/blas_setup.h"
+#include "nn/product/blas_setup.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/exit_status.h"
 #include "proto/rpc/service_main.h"

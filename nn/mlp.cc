@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/check.h"
-#include "nn/product.h"
+#include "nn/product/blas_product.h"
 
 namespace dbr {
 namespace {

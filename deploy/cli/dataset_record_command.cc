@@ -23,7 +23,7 @@
 #include "deploy/terminal/terminal.h"
 #include "envs/env.h"
 #include "envs/registry/registry.h"
-#include "nn/blas_setup.h"
+#include "nn/product/blas_setup.h"
 #include "replay/dataset/dataset_writer.h"
 
 namespace dbr {

@@ -19,7 +19,7 @@
 #include "deploy/launch/run_plan.h"
 #include "deploy/manual/number_option.h"
 #include "deploy/terminal/output.h"
-#include "nn/blas_setup.h"
+#include "nn/product/blas_setup.h"
 
 namespace dbr {
 namespace {

@@ -15,7 +15,7 @@
 #include "deploy/cli/command_line.h"
 #include "deploy/launch/commit.h"
 #include "deploy/manual/man_page.h"
-#include "nn/blas_setup.h"
+#include "nn/product/blas_setup.h"
 #include "proto/config/config_fields.h"
 
 namespace {

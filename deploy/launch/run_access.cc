@@ -9,7 +9,7 @@
 #include "core/run_folder.h"
 #include "core/safetensors.h"
 #include "core/status_macros.h"
-#include "nn/blas_setup.h"
+#include "nn/product/blas_setup.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/address.h"
 

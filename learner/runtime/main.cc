@@ -22,7 +22,7 @@
 #include "learner/runtime/policy_service.h"
 #include "learner/runtime/rollout_reporter.h"
 #include "learner/runtime/trainer.h"
-#include "nn/blas_setup.h"
+#include "nn/product/blas_setup.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/deadline.h"
 #include "proto/rpc/exit_status.h"

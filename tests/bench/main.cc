@@ -1,7 +1,7 @@
 // dbr-bench: the benchmarks, with OpenBLAS set up as the programs have it.
 #include <benchmark/benchmark.h>
 
-#include "nn/blas_setup.h"
+#include "nn/product/blas_setup.h"
 
 int main(int argc, char** argv) {
   dbr::RestartWithBlasSetUp(argv);

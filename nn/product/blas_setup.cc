@@ -1,4 +1,4 @@
-#include "nn/blas_setup.h"
+#include "nn/product/blas_setup.h"
 
 #include <cblas.h>
 #include <sys/mman.h>

@@ -1,4 +1,4 @@
-#include "nn/blas_setup.h"
+#include "nn/product/blas_setup.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
