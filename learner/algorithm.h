@@ -45,6 +45,7 @@ struct AlgorithmSpec {
   ActionSpace actions;
   std::vector<int> hidden_sizes;
   bool normalize_observations = false;
+  bool bfloat16 = false;  // whether matrix products take bfloat16 and sum in float32
   AlgorithmConfig config;
   std::uint64_t seed = 0;
 };

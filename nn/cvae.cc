@@ -23,24 +23,21 @@ CvaeLoss<Scalar> Cvae<Scalar>::Gradient(const CvaeParameters<Scalar>& parameters
   DBR_CHECK(batch.noise.rows() == shape_.latent_size && batch.noise.cols() == batch.observations.cols());
   encoder_input_.resize(shape_.encoder.input_size(), batch.observations.cols());
   encoder_input_ << batch.observations, batch.actions;
-  latent_.Split(MlpForward<Scalar>(shape_.encoder, parameters.encoder.data(), encoder_input_, &encoder_),
+  latent_.Split(MlpForward<Scalar>(shape_.encoder, parameters.encoder, encoder_input_, &encoder_),
                 kLatentLogStd);
   spread_ = (latent_.log_std().array().exp() * batch.noise.array()).matrix();
   decoder_input_.resize(shape_.decoder.input_size(), batch.observations.cols());
   decoder_input_ << batch.observations, latent_.mean() + spread_;
   const MatrixX<Scalar>& decoded =
-      MlpForward<Scalar>(shape_.decoder, parameters.decoder.data(), decoder_input_, &decoder_);
+      MlpForward<Scalar>(shape_.decoder, parameters.decoder, decoder_input_, &decoder_);
 
   CvaeLoss<Scalar> result;
   result.reconstruction = Reconstruct(decoded, batch.actions);
-  MlpParameterGradient<Scalar>(shape_.decoder, parameters.decoder.data(), decoder_input_, d_decoded_,
-                               &decoder_, d_decoder);
-  MlpInputGradientOfDeltas<Scalar>(shape_.decoder, parameters.decoder.data(), d_decoded_, decoder_,
-                                   &d_decoder_input_);
+  MlpParameterGradient<Scalar>(parameters.decoder, decoder_input_, d_decoded_, &decoder_, d_decoder);
+  MlpInputGradientOfDeltas<Scalar>(parameters.decoder, d_decoded_, &decoder_, &d_decoder_input_);
   result.kl = Regularize(kl_weight);
   latent_.Join(d_latent_, &d_encoded_);
-  MlpParameterGradient<Scalar>(shape_.encoder, parameters.encoder.data(), encoder_input_, d_encoded_,
-                               &encoder_, d_encoder);
+  MlpParameterGradient<Scalar>(parameters.encoder, encoder_input_, d_encoded_, &encoder_, d_encoder);
   result.loss = result.reconstruction + kl_weight * result.kl;
   return result;
 }
@@ -68,7 +65,7 @@ Scalar Cvae<Scalar>::Regularize(Scalar kl_weight) {
 }
 
 template <class Scalar>
-const MatrixX<Scalar>& Cvae<Scalar>::Decode(const VectorX<Scalar>& decoder,
+const MatrixX<Scalar>& Cvae<Scalar>::Decode(const MlpParameters<Scalar>& decoder,
                                             const MatrixX<Scalar>& observations,
                                             const MatrixX<Scalar>& latents) {
   DBR_CHECK(latents.rows() == shape_.latent_size && latents.cols() % observations.cols() == 0);
@@ -77,7 +74,7 @@ const MatrixX<Scalar>& Cvae<Scalar>::Decode(const VectorX<Scalar>& decoder,
   for (Eigen::Index j = 0; j < latents.cols(); ++j) {
     sampling_input_.col(j) << observations.col(j / count), latents.col(j);
   }
-  return MlpForward<Scalar>(shape_.decoder, decoder.data(), sampling_input_, &sampling_);
+  return MlpForward<Scalar>(shape_.decoder, decoder, sampling_input_, &sampling_);
 }
 
 template class Cvae<float>;

@@ -28,8 +28,8 @@ struct CvaeShape {
 // The caller's parameters of both networks.
 template <class Scalar>
 struct CvaeParameters {
-  const VectorX<Scalar>& encoder;
-  const VectorX<Scalar>& decoder;
+  MlpParameters<Scalar> encoder;
+  MlpParameters<Scalar> decoder;
 };
 
 // What a gradient is taken on.
@@ -65,7 +65,7 @@ class Cvae {
 
   // [dimensions x n * count] actions before their tanh, decoded from latents [latent x n * count] at n
   // observations [observation x n]: sample i of state s is column s * count + i. Valid until the next call.
-  const MatrixX<Scalar>& Decode(const VectorX<Scalar>& decoder, const MatrixX<Scalar>& observations,
+  const MatrixX<Scalar>& Decode(const MlpParameters<Scalar>& decoder, const MatrixX<Scalar>& observations,
                                 const MatrixX<Scalar>& latents);
 
  private:

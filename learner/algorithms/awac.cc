@@ -30,7 +30,6 @@ absl::Status Awac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const Basic
   networks_.SetAdvantages(advantage_);
   AdvantageWeights<Scalar>(advantage_, {config().temperature(), config().max_weight()}, &weights_);
   pi_.Step(uniform, &weights_, &networks_.policy);
-  networks_.UpdateTargets();
   ++networks_.updates;
   const AdvantageFigures advantages = FiguresOf(networks_.advantages);
   return SetMetrics({critic_loss, pi_.loss(), weights_.mean(), weights_.maxCoeff(),

@@ -22,10 +22,9 @@ struct BearNetworks : ActorCritic<Scalar> {
   // Whether the warm start is over.
   bool UseQ() const { return this->updates >= this->spec.config.bear().warm_start_updates(); }
 
-  // Ends an update: one step of the multiplier and of the targets.
+  // Ends an update: one step of the multiplier.
   void Finish(const ConstrainedLoss<Scalar>& loss) {
     multiplier.Step(loss.divergence - loss.threshold);
-    this->UpdateTargets();
     ++this->updates;
   }
 

@@ -18,7 +18,7 @@ Brac<Scalar>::Brac(const AlgorithmSpec& spec)
             {"train/advantage_positive"},
             {"train/advantage_std"}},
            spec, /*policy_target=*/true),
-      behavior_(networks_.policy.shape(), spec.config.learning_rate(), /*with_target=*/false, networks_.rng),
+      behavior_(networks_.policy.shape(), networks_.Options(spec, /*with_target=*/false), networks_.rng),
       multiplier_(spec.config.brac().first_multiplier(), spec.config.brac().multiplier_learning_rate()) {}
 
 template <class Scalar>
@@ -36,7 +36,6 @@ absl::Status Brac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const Basic
   if (config().adaptive_multiplier()) {
     multiplier_.Step(loss.divergence - static_cast<Scalar>(config().epsilon()));
   }
-  networks_.UpdateTargets();
   ++networks_.updates;
   const AdvantageFigures advantages = FiguresOf(networks_.advantages);
   return SetMetrics(

@@ -19,7 +19,7 @@ template <class Scalar>
 ContinuousBear<Scalar>::ContinuousBear(const AlgorithmSpec& spec)
     : Base(BearNetworks<Scalar>::Metrics(), spec),
       options_(PolicyLossOptions::Of(spec.config.bear())),
-      vae_(VaeShape(spec), spec.config.learning_rate(), networks_.rng) {}
+      vae_(VaeShape(spec), networks_.Options(spec, /*with_target=*/false), networks_.rng) {}
 
 template <class Scalar>
 absl::Status ContinuousBear<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,

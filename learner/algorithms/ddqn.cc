@@ -1,5 +1,7 @@
 #include "learner/algorithms/ddqn.h"
 
+#include <type_traits>
+
 #include "learner/algorithms/algorithm_adapter.h"
 #include "learner/objectives/critic_target.h"
 #include "learner/objectives/discrete_losses.h"
@@ -14,7 +16,10 @@ Ddqn<Scalar>::Ddqn(const AlgorithmSpec& spec)
     : spec_(spec),
       init_rng_(spec.seed),
       network_(MlpShape(spec.observation_size, spec.hidden_sizes, spec.actions.size),
-               spec.config.learning_rate(), /*with_target=*/true, init_rng_),
+               {.learning_rate = spec.config.learning_rate(),
+                .with_target = true,
+                .bfloat16 = std::is_same_v<Scalar, float> && spec.bfloat16},
+               init_rng_),
       metrics_{{"train/critic_loss"},    {"train/value_mean"},         {"train/target_mean"},
                {"train/advantage_mean"}, {"train/advantage_positive"}, {"train/advantage_std"}} {}
 
@@ -22,13 +27,13 @@ template <class Scalar>
 absl::Status Ddqn<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
                                   const BasicBatch<Scalar>&) {
   network_.set_learning_rate(LearningRate(spec_.config, updates_));
+  network_.set_target_tau(spec_.config.target_tau());
   ComputeTarget(uniform);
   const MatrixX<Scalar>& q = network_.Forward(uniform.observations);
   const Scalar loss = CriticLoss<Scalar>(q, uniform.actions, target_, &d_q_);
   GreedyValue<Scalar>(q, q, uniform.masks, &value_);
   ComputeAdvantages<Scalar>(q, q, uniform.actions, value_, &advantages_);
   network_.Step(uniform.observations, d_q_);
-  network_.UpdateTarget(spec_.config.target_tau());
   ++updates_;
   const AdvantageFigures advantages = FiguresOf(advantages_);
   return SetMetrics(

@@ -9,8 +9,7 @@ template <class Scalar>
 DiscreteBear<Scalar>::DiscreteBear(const AlgorithmSpec& spec)
     : Base(BearNetworks<Scalar>::Metrics(), spec),
       options_(PolicyLossOptions::Of(spec.config.bear())),
-      behavior_(networks_.policy.shape(), spec.config.learning_rate(), /*with_target=*/false, networks_.rng) {
-}
+      behavior_(networks_.policy.shape(), networks_.Options(spec, /*with_target=*/false), networks_.rng) {}
 
 template <class Scalar>
 absl::Status DiscreteBear<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,

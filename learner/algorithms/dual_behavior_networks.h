@@ -26,8 +26,8 @@ template <class Scalar>
 struct DualBehaviorNetworks : ActorCritic<Scalar> {
   explicit DualBehaviorNetworks(const AlgorithmSpec& spec)
       : ActorCritic<Scalar>(spec, /*policy_target=*/true),
-        beta_plus(this->policy.shape(), spec.config.learning_rate(), /*with_target=*/false, this->rng),
-        beta_minus(this->policy.shape(), spec.config.learning_rate(), /*with_target=*/false, this->rng),
+        beta_plus(this->policy.shape(), this->Options(spec, /*with_target=*/false), this->rng),
+        beta_minus(this->policy.shape(), this->Options(spec, /*with_target=*/false), this->rng),
         multiplier(spec.config.dbr().first_multiplier(), spec.config.dbr().multiplier_learning_rate()),
         constrained(spec.config.dbr().constraint() != DbrConfig::NONE) {}
 
@@ -44,10 +44,9 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
     beta_minus.set_learning_rate(learning_rate);
   }
 
-  // Ends an update: one step of the multiplier and of the targets.
+  // Ends an update: one step of the multiplier.
   void Finish(const PolicyLoss<Scalar>& loss) {
     if (constrained) multiplier.Step(loss.divergence_plus - loss.threshold);
-    this->UpdateTargets();
     ++this->updates;
   }
 

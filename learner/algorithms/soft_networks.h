@@ -25,11 +25,10 @@ struct SoftNetworks : ActorCritic<Scalar> {
       : ActorCritic<Scalar>(spec, /*policy_target=*/false),
         temperature(config.first_temperature(), config.temperature_learning_rate(), kTemperatureLimits) {}
 
-  // Ends an update: one step of the temperature and of the targets. The temperature rises while the policy's
+  // Ends an update: one step of the temperature. The temperature rises while the policy's
   // entropy is below target_entropy. Both are in nats.
   void Finish(const SoftPolicyLoss<Scalar>& loss, Scalar target_entropy) {
     temperature.Step(target_entropy - loss.entropy);
-    this->UpdateTargets();
     ++this->updates;
   }
 

@@ -15,14 +15,15 @@ Td3<Scalar>::Td3(const AlgorithmSpec& spec)
             {"train/advantage_positive"},
             {"train/advantage_std"}},
            spec, /*policy_target=*/true) {
-  PinLogStd(networks_.policy.shape(), &networks_.policy.parameters());
-  networks_.policy.ResetTarget();
+  VectorX<Scalar> parameters = networks_.policy.parameters();
+  PinLogStd(networks_.policy.shape(), &parameters);
+  networks_.policy.SetParameters(parameters);
 }
 
 template <class Scalar>
 absl::Status Td3<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
                                  const BasicBatch<Scalar>&) {
-  networks_.Begin();
+  networks_.Begin(/*move_targets=*/ImprovesPolicy());
   const Scalar critic_loss = FitCritics(uniform);
   const Scalar policy_loss = ImprovePolicy(uniform);
   ++networks_.updates;
@@ -56,10 +57,9 @@ Scalar Td3<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
   value_.resize(batch.size());
   MeanOfSmaller<Scalar>(critics.value1(), critics.value2(), &value_);
   networks_.SetAdvantages(regression_.behavior_value() - value_);
-  if (networks_.updates % config().policy_delay() != 0) return loss;
+  if (!ImprovesPolicy()) return loss;
   objective_.Gradient(pi_, &critics, &d_output_);
   networks_.policy.Step(batch.observations, d_output_);
-  networks_.UpdateTargets();
   return loss;
 }
 

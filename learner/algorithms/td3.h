@@ -42,6 +42,8 @@ class Td3 : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
   using Base::networks_;
 
   const Td3Config& config() const { return networks_.spec.config.td3(); }
+  // Whether this update moves the policy and the targets.
+  bool ImprovesPolicy() const { return networks_.updates % config().policy_delay() == 0; }
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
   // Makes steps 2 and 3. Returns the policy's loss, also in an update that does not move the policy.
   Scalar ImprovePolicy(const BasicBatch<Scalar>& batch);

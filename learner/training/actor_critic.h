@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -27,17 +28,28 @@ struct ActorCritic {
       : spec(algorithm_spec),
         rng(spec.seed),
         runner(UpdateThreads(spec.config)),
-        policy(PolicyShape(PolicySpecOf(spec)), spec.config.learning_rate(), policy_target, rng),
-        critics(CriticShape(PolicySpecOf(spec)), spec.config.learning_rate(), rng, &runner) {}
+        policy(PolicyShape(PolicySpecOf(spec)), Options(spec, policy_target), rng),
+        critics(CriticShape(PolicySpecOf(spec)), Options(spec, /*with_target=*/true), rng, &runner) {}
+
+  // How the networks of `algorithm_spec` are trained.
+  static TrainingOptions Options(const AlgorithmSpec& algorithm_spec, bool with_target) {
+    return {.learning_rate = algorithm_spec.config.learning_rate(),
+            .with_target = with_target,
+            .bfloat16 = std::is_same_v<Scalar, float> && algorithm_spec.bfloat16};
+  }
 
   // Every transition of the batch is drawn from D.
   BatchNeeds needs() const { return {.uniform = static_cast<int>(spec.config.batch_size())}; }
 
-  // Sets the learning rate of this update. Returns it, for networks that are not in this struct.
-  double Begin() {
+  // Sets the learning rate of this update, and whether its steps move the targets of the critics and, where
+  // it has one, of the policy. Returns the learning rate, for networks that are not in this struct.
+  double Begin(bool move_targets = true) {
     const double learning_rate = LearningRate(spec.config, updates);
+    const double tau = move_targets ? spec.config.target_tau() : 0;
     policy.set_learning_rate(learning_rate);
     critics.set_learning_rate(learning_rate);
+    policy.set_target_tau(tau);
+    critics.set_target_tau(tau);
     return learning_rate;
   }
 
@@ -46,12 +58,6 @@ struct ActorCritic {
   void SetAdvantages(const Eigen::MatrixBase<Vector>& advantage) {
     advantages.resize(static_cast<std::size_t>(advantage.size()));
     Eigen::Map<Eigen::VectorXf>(advantages.data(), advantage.size()) = advantage.template cast<float>();
-  }
-
-  // Polyak averages the critics' targets, and the policy's target where it has one.
-  void UpdateTargets() {
-    critics.UpdateTargets(spec.config.target_tau());
-    policy.UpdateTarget(spec.config.target_tau());
   }
 
   // Starts a snapshot with the policy and the two critics. An algorithm then adds its own networks.

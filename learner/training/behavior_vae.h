@@ -14,17 +14,15 @@ namespace dbr {
 template <class Scalar>
 class BehaviorVae {
  public:
-  BehaviorVae(const CvaeShape& shape, double learning_rate, Rng& rng)
-      : encoder_(shape.encoder, learning_rate, /*with_target=*/false, rng),
-        decoder_(shape.decoder, learning_rate, /*with_target=*/false, rng),
-        cvae_(shape) {}
+  BehaviorVae(const CvaeShape& shape, const TrainingOptions& options, Rng& rng)
+      : encoder_(shape.encoder, options, rng), decoder_(shape.decoder, options, rng), cvae_(shape) {}
 
   const CvaeShape& shape() const { return cvae_.shape(); }
 
   // Makes one step of both networks on the VAE's loss (nn/cvae.h). Returns the loss from before the step.
   CvaeLoss<Scalar> Fit(const CvaeBatch<Scalar>& batch, Scalar kl_weight) {
-    const CvaeLoss<Scalar> loss = cvae_.Gradient({encoder_.parameters(), decoder_.parameters()}, batch,
-                                                 kl_weight, &encoder_.gradient(), &decoder_.gradient());
+    const CvaeLoss<Scalar> loss = cvae_.Gradient({encoder_.online(), decoder_.online()}, batch, kl_weight,
+                                                 &encoder_.gradient(), &decoder_.gradient());
     encoder_.ApplyGradient();
     decoder_.ApplyGradient();
     return loss;
@@ -36,7 +34,7 @@ class BehaviorVae {
   const MatrixX<Scalar>& Sample(const MatrixX<Scalar>& observations, const MatrixX<Scalar>& noise,
                                 Scalar limit) {
     latents_ = noise.cwiseMax(-limit).cwiseMin(limit);
-    return cvae_.Decode(decoder_.parameters(), observations, latents_);
+    return cvae_.Decode(decoder_.online(), observations, latents_);
   }
 
   void set_learning_rate(double learning_rate) {

@@ -2,7 +2,9 @@
 // Polyak target.
 #pragma once
 
+#include <algorithm>
 #include <string>
+#include <type_traits>
 
 #include "absl/status/status.h"
 #include "core/rng.h"
@@ -10,24 +12,43 @@
 #include "learner/training/tensor_state.h"
 #include "nn/adam.h"
 #include "nn/mlp.h"
+#include "nn/rounded_weights.h"
 
 namespace dbr {
 
-// Owns its parameters. It can be copied. One thread at a time. Inputs x are [input x n].
+struct TrainingOptions {
+  double learning_rate = 0;
+  bool with_target = false;
+  bool bfloat16 = false;  // whether products take weights and activations in bfloat16; Scalar is then float
+};
+
+// Owns its parameters. It can be moved. One thread at a time. Inputs x are [input x n].
 template <class Scalar>
 class TrainedNetwork {
  public:
-  TrainedNetwork(const MlpShape& shape, double learning_rate, bool with_target, Rng& rng)
+  TrainedNetwork(const MlpShape& shape, const TrainingOptions& options, Rng& rng)
       : shape_(shape),
         parameters_(InitialParameters<Scalar>(shape, rng)),
-        adam_(shape.parameter_count(), learning_rate),
+        adam_(shape.parameter_count(), options.learning_rate),
         gradient_(VectorX<Scalar>::Zero(shape.parameter_count())) {
-    if (with_target) target_ = parameters_;
+    if (options.with_target) target_ = parameters_;
+    if (options.bfloat16) {
+      rounded_ = RoundedWeights(shape);
+      if (options.with_target) rounded_target_ = RoundedWeights(shape);
+    }
+    RoundAll();
   }
 
   const MlpShape& shape() const { return shape_; }
-  VectorX<Scalar>& parameters() { return parameters_; }
   const VectorX<Scalar>& parameters() const { return parameters_; }
+  // What products read of the online network.
+  MlpParameters<Scalar> online() const { return Parameters(parameters_, rounded_); }
+  // Replaces the parameters [parameter_count], and those of the target where there is one.
+  void SetParameters(const VectorX<Scalar>& parameters) {
+    parameters_ = parameters;
+    if (target_.size() > 0) target_ = parameters;
+    RoundAll();
+  }
   const VectorX<Scalar>& target() const { return target_; }
   const VectorX<Scalar>& gradient() const { return gradient_; }
   // For a caller that computes the gradient itself and then calls ApplyGradient.
@@ -36,47 +57,61 @@ class TrainedNetwork {
   // Returns the online network's output [output x n] and keeps what Step needs. The results of this and the
   // next three functions are valid until the next call that uses the same workspace.
   const MatrixX<Scalar>& Forward(const ConstMatrixRef<Scalar>& x) {
-    return MlpForward(shape_, parameters_.data(), x, &activations_);
+    return MlpForward<Scalar>(shape_, online(), x, &activations_);
   }
   // Returns the online network's output [output x n] without keeping anything for a gradient. What Forward
   // kept stays valid. Evaluate and ForwardTarget share a workspace.
   const MatrixX<Scalar>& Evaluate(const ConstMatrixRef<Scalar>& x) {
-    return MlpForward(shape_, parameters_.data(), x, &target_activations_);
+    return MlpForward<Scalar>(shape_, online(), x, &target_activations_);
   }
   // Returns the target network's output [output x n]. No gradient can be taken through it. Requires a target.
   const MatrixX<Scalar>& ForwardTarget(const ConstMatrixRef<Scalar>& x) {
-    return MlpForward(shape_, target_.data(), x, &target_activations_);
+    return MlpForward<Scalar>(shape_, Parameters(target_, rounded_target_), x, &target_activations_);
   }
   // Returns the online network's output [output x n] and keeps what InputGradient needs. What Forward kept
   // stays valid.
   const MatrixX<Scalar>& ForwardForInput(const ConstMatrixRef<Scalar>& x) {
-    return MlpForward(shape_, parameters_.data(), x, &input_activations_);
+    return MlpForward<Scalar>(shape_, online(), x, &input_activations_);
   }
   // Computes the gradient with respect to the x [input x n] of the newest ForwardForInput.
   void InputGradient(const ConstMatrixRef<Scalar>& d_output, MatrixX<Scalar>* d_x) {
-    MlpInputGradient(shape_, parameters_.data(), d_output, &input_activations_, d_x);
+    MlpInputGradient<Scalar>(online(), d_output, &input_activations_, d_x);
   }
   // Computes gradient() for the newest Forward(x) from the gradient of the loss with respect to its output
   // [output x n].
   void ComputeGradient(const ConstMatrixRef<Scalar>& x, const ConstMatrixRef<Scalar>& d_output) {
-    MlpParameterGradient(shape_, parameters_.data(), x, d_output, &activations_, &gradient_);
+    MlpParameterGradient<Scalar>(online(), x, d_output, &activations_, &gradient_);
   }
-  // Calls ComputeGradient and makes one Adam step.
+  // Calls ComputeGradient and ApplyGradient.
   void Step(const ConstMatrixRef<Scalar>& x, const ConstMatrixRef<Scalar>& d_output) {
     ComputeGradient(x, d_output);
     ApplyGradient();
   }
-  // Makes one Adam step on gradient().
-  void ApplyGradient() { adam_.Step(gradient_, &parameters_); }
+  // Makes one Adam step on gradient(), moves the target (Polyak averaging: target += tau * (online - target))
+  // and rounds both for the products, in one pass over memory.
+  void ApplyGradient() {
+    adam_.BeginStep();
+    for (int layer = 0; layer < shape_.layer_count(); ++layer) {
+      const Eigen::Index rows = shape_.out(layer), columns = shape_.in(layer);
+      const Eigen::Index group = std::max<Eigen::Index>(1, kGroupEntries / rows);
+      for (Eigen::Index first = 0; first < columns; first += group) {
+        const Eigen::Index n = std::min(group, columns - first);
+        const Eigen::Index offset = shape_.weight_offset(layer) + first * rows;
+        StepPart(offset, n * rows);
+        if constexpr (std::is_same_v<Scalar, float>) {
+          if (!rounded_.empty()) rounded_.Round(layer, first, n, parameters_.data() + offset);
+          if (moves_target() && !rounded_target_.empty()) {
+            rounded_target_.Round(layer, first, n, target_.data() + offset);
+          }
+        }
+      }
+      StepPart(shape_.bias_offset(layer), rows);
+    }
+  }
   void set_learning_rate(double learning_rate) { adam_.set_learning_rate(learning_rate); }
-  // Copies the online network into the target, where there is one.
-  void ResetTarget() {
-    if (target_.size() > 0) target_ = parameters_;
-  }
-  // Polyak averages the target, where there is one: target += tau * (online - target).
-  void UpdateTarget(double tau) {
-    if (target_.size() > 0) PolyakUpdate(parameters_, static_cast<Scalar>(tau), &target_);
-  }
+  // The share of the online network that each of the next steps adds to the target, where there is one. It is
+  // 0 in a new network.
+  void set_target_tau(double tau) { target_tau_ = static_cast<Scalar>(tau); }
 
   void Save(const std::string& name, TensorFile* file) const {
     TrainedNetwork& self = const_cast<TrainedNetwork&>(*this);
@@ -93,10 +128,32 @@ class TrainedNetwork {
     std::uint64_t steps = 0;
     status.Update(GetCounter(name + ".adam.steps", file, &steps));
     adam_.set_steps(steps);
+    RoundAll();
     return status;
   }
 
  private:
+  // How many parameters a step takes through all its parts at once: they stay in the first-level cache.
+  static constexpr Eigen::Index kGroupEntries = 1024;
+
+  static MlpParameters<Scalar> Parameters(const VectorX<Scalar>& values, const RoundedWeights& rounded) {
+    return {values.data(), rounded.empty() ? nullptr : &rounded};
+  }
+  bool moves_target() const { return target_.size() > 0 && target_tau_ > 0; }
+  // One step of entries first ... first + n, and of the target.
+  void StepPart(Eigen::Index first, Eigen::Index n) {
+    adam_.StepPart(gradient_.data(), first, n, parameters_.data());
+    if (!moves_target()) return;
+    auto target = target_.segment(first, n);
+    target += target_tau_ * (parameters_.segment(first, n) - target);
+  }
+  void RoundAll() {
+    if constexpr (std::is_same_v<Scalar, float>) {
+      if (!rounded_.empty()) rounded_.RoundAll(shape_, parameters_.data());
+      if (!rounded_target_.empty()) rounded_target_.RoundAll(shape_, target_.data());
+    }
+  }
+
   template <class Function>
   void Visit(const std::string& name, const Function& function) {
     function(name, parameters_);
@@ -108,6 +165,8 @@ class TrainedNetwork {
   MlpShape shape_;
   VectorX<Scalar> parameters_;
   VectorX<Scalar> target_;
+  RoundedWeights rounded_, rounded_target_;  // empty unless products are made in bfloat16
+  Scalar target_tau_ = 0;
   Adam<Scalar> adam_;
   VectorX<Scalar> gradient_;
   MlpActivations<Scalar> activations_;

@@ -15,11 +15,11 @@ namespace dbr {
 template <class Scalar>
 class TwinCritic {
  public:
-  // `runner` must outlive the critics.
-  TwinCritic(const MlpShape& shape, double learning_rate, Rng& rng, PairRunner* runner)
+  // `options` asks for targets. `runner` must outlive the critics.
+  TwinCritic(const MlpShape& shape, const TrainingOptions& options, Rng& rng, PairRunner* runner)
       : runner_(runner),
-        first_{TrainedNetwork<Scalar>(shape, learning_rate, /*with_target=*/true, rng), {}, {}, {}, 0},
-        second_{TrainedNetwork<Scalar>(shape, learning_rate, /*with_target=*/true, rng), {}, {}, {}, 0} {}
+        first_{TrainedNetwork<Scalar>(shape, options, rng), {}, {}, {}, 0},
+        second_{TrainedNetwork<Scalar>(shape, options, rng), {}, {}, {}, 0} {}
 
   // Evaluates the targets. Their values are target1() and target2() until the next call.
   void EvaluateTargets(const ConstMatrixRef<Scalar>& x) {
@@ -29,9 +29,9 @@ class TwinCritic {
   const MatrixX<Scalar>& target1() const { return *first_.target; }
   const MatrixX<Scalar>& target2() const { return *second_.target; }
 
-  // Makes one step of both critics on loss(q, &d_q). `loss` returns a critic's loss and sets its gradient
-  // with respect to q [outputs x n]; it may run on two threads at once. q1() and q2() keep the values from
-  // before the step. Returns the mean of the two losses.
+  // Makes one step of both critics, and of their targets, on loss(q, &d_q). `loss` returns a critic's loss
+  // and sets its gradient with respect to q [outputs x n]; it may run on two threads at once. q1() and q2()
+  // keep the values from before the step. Returns the mean of the two losses.
   template <class Loss>
   Scalar Fit(const ConstMatrixRef<Scalar>& x, const Loss& loss) {
     const auto fit = [&](Critic* critic) {
@@ -71,8 +71,10 @@ class TwinCritic {
     first_.network.set_learning_rate(learning_rate);
     second_.network.set_learning_rate(learning_rate);
   }
-  void UpdateTargets(double tau) {
-    runner_->Run([&] { first_.network.UpdateTarget(tau); }, [&] { second_.network.UpdateTarget(tau); });
+  // The tau of the targets' Polyak averaging in the next steps.
+  void set_target_tau(double tau) {
+    first_.network.set_target_tau(tau);
+    second_.network.set_target_tau(tau);
   }
   const TrainedNetwork<Scalar>& first() const { return first_.network; }
   const TrainedNetwork<Scalar>& second() const { return second_.network; }

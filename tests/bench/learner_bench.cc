@@ -2,9 +2,14 @@
 // operations a second.
 #include <benchmark/benchmark.h>
 
+#include <string>
+#include <type_traits>
+
 #include "core/rng.h"
 #include "learner/algorithm.h"
 #include "learner/algorithms/registry.h"
+#include "nn/product/layer_products.h"
+#include "nn/product/product_library.h"
 
 namespace dbr {
 namespace {
@@ -113,31 +118,59 @@ void LearnerUpdate(benchmark::State& state, const AlgorithmSpec& spec) {
       (*algorithm)->UpdateFlops() * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
   state.SetItemsProcessed(state.iterations());
 }
-#define DBR_UPDATE(name, spec) \
-  BENCHMARK_CAPTURE(LearnerUpdate, , spec)->Name("LearnerUpdate/" name)->Unit(benchmark::kMillisecond)
 
-DBR_UPDATE("dbr/connect4", With(Connect4(), DiscreteDbr));
-DBR_UPDATE("bear/connect4", With(Connect4(), Bear));
-DBR_UPDATE("discrete_sac/connect4", With(Connect4(), DiscreteSac));
-DBR_UPDATE("ddqn/connect4", With(Connect4(), Ddqn));
-DBR_UPDATE("sac/hopper", With(Hopper(), Sac));
-DBR_UPDATE("dbr/hopper", With(Hopper(), Dbr));
-DBR_UPDATE("dbr/ant", With(Ant(), Dbr));
-DBR_UPDATE("bear/ant", With(Ant(), Bear));
-DBR_UPDATE("brac/ant", With(Ant(), Brac));
-DBR_UPDATE("sac/ant", With(Ant(), Sac));
-DBR_UPDATE("td3/ant", With(Ant(), Td3));
-DBR_UPDATE("awac/ant", With(Ant(), Awac));
-// These measure wall-clock time, on one thread and on two.
-DBR_UPDATE("sac/ant/one_thread", With(Ant(), Sac))->UseRealTime();
-DBR_UPDATE("dbr/ant/one_thread", With(Ant(), Dbr))->UseRealTime();
-DBR_UPDATE("sac/ant/two_threads", OnTwoThreads(With(Ant(), Sac)))->UseRealTime();
-DBR_UPDATE("dbr/ant/two_threads", OnTwoThreads(With(Ant(), Dbr)))->UseRealTime();
-#undef DBR_UPDATE
+AlgorithmSpec InBfloat16(AlgorithmSpec spec) {
+  spec.bfloat16 = true;
+  return spec;
+}
 
-// The limit: a product of two square matrices in single precision.
+// Each update in single precision and, where the processor has it, in bfloat16.
+void Register(const std::string& name, const AlgorithmSpec& spec, bool real_time) {
+  const auto add = [&](const std::string& full_name, const AlgorithmSpec& of) {
+    benchmark::internal::Benchmark* const added = benchmark::RegisterBenchmark(
+        full_name.c_str(), [of](benchmark::State& state) { LearnerUpdate(state, of); });
+    added->Unit(benchmark::kMillisecond);
+    if (real_time) added->UseRealTime();
+  };
+  add("LearnerUpdate/" + name + "/f32", spec);
+  if (HasBfloat16()) add("LearnerUpdate/" + name + "/bf16", InBfloat16(spec));
+}
+
+const bool kUpdatesRegistered = [] {
+  const auto add = [](const char* name, const AlgorithmSpec& env, auto algorithm) {
+    Register(name, With(env, algorithm), /*real_time=*/false);
+  };
+  add("dbr/connect4", Connect4(), DiscreteDbr);
+  add("bear/connect4", Connect4(), Bear);
+  add("discrete_sac/connect4", Connect4(), DiscreteSac);
+  add("ddqn/connect4", Connect4(), Ddqn);
+  add("sac/hopper", Hopper(), Sac);
+  add("dbr/hopper", Hopper(), Dbr);
+  add("dbr/ant", Ant(), Dbr);
+  add("bear/ant", Ant(), Bear);
+  add("brac/ant", Ant(), Brac);
+  add("sac/ant", Ant(), Sac);
+  add("td3/ant", Ant(), Td3);
+  add("awac/ant", Ant(), Awac);
+  // These measure wall-clock time, on one thread and on two.
+  const AlgorithmSpec sac = With(Ant(), Sac), dbr = With(Ant(), Dbr);
+  Register("sac/ant/one_thread", sac, /*real_time=*/true);
+  Register("dbr/ant/one_thread", dbr, /*real_time=*/true);
+  Register("sac/ant/two_threads", OnTwoThreads(sac), /*real_time=*/true);
+  Register("dbr/ant/two_threads", OnTwoThreads(dbr), /*real_time=*/true);
+  return true;
+}();
+
+// The limits: a product of two square matrices, by OpenBLAS, and as a layer's product by what the networks
+// use.
+constexpr Eigen::Index kSize = 256;
+
+void SetProductFlops(benchmark::State& state) {
+  state.counters["flops"] = benchmark::Counter(
+      2.0 * kSize * kSize * kSize * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+}
+
 void Sgemm(benchmark::State& state) {
-  constexpr Eigen::Index kSize = 256;
   const MatrixX<float> a = MatrixX<float>::Random(kSize, kSize), b = MatrixX<float>::Random(kSize, kSize);
   MatrixX<float> c(kSize, kSize);
   for (auto _ : state) {
@@ -145,10 +178,31 @@ void Sgemm(benchmark::State& state) {
     benchmark::DoNotOptimize(c.data());
     benchmark::ClobberMemory();
   }
-  state.counters["flops"] = benchmark::Counter(
-      2.0 * kSize * kSize * kSize * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+  SetProductFlops(state);
 }
 BENCHMARK(Sgemm)->Name("Sgemm/256x256x256");
+
+template <class Element>
+void LayerProduct(benchmark::State& state) {
+  if (std::is_same_v<Element, Bfloat16> && !HasBfloat16()) {
+    return state.SkipWithError("the processor has no bfloat16");
+  }
+  const MatrixX<Element> weight = MatrixX<float>::Random(kSize, kSize).cast<Element>(),
+                         x = MatrixX<float>::Random(kSize, kSize).cast<Element>();
+  const VectorX<float> bias = VectorX<float>::Random(kSize);
+  MatrixX<Element> y(kSize, kSize);
+  const auto products = MakeLayerProducts<Element>({kSize, kSize});
+  for (auto _ : state) {
+    products->Hidden({weight.data(), kSize, bias.data()}, {x.data(), kSize, kSize, kSize},
+                     {y.data(), kSize, kSize, kSize});
+    benchmark::DoNotOptimize(y.data());
+    benchmark::ClobberMemory();
+  }
+  state.SetLabel(KernelsName(std::is_same_v<Element, Bfloat16>));
+  SetProductFlops(state);
+}
+BENCHMARK(LayerProduct<float>)->Name("Product/f32");
+BENCHMARK(LayerProduct<Bfloat16>)->Name("Product/bf16");
 
 }  // namespace
 }  // namespace dbr

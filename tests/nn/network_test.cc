@@ -50,10 +50,10 @@ TEST(Mlp, AgreesWithTheReference) {
     const Matrix x = ToMatrix(mlp["x"]), dy = ToMatrix(mlp["dy"]);
     ExpectNear(MlpForward<double>(shape, parameters.data(), x, &activations), ToMatrix(mlp["y"]));
     Vector gradient;
-    MlpParameterGradient<double>(shape, parameters.data(), x, dy, &activations, &gradient);
+    MlpParameterGradient<double>(parameters.data(), x, dy, &activations, &gradient);
     ExpectNear(gradient, expected_gradient);
     Matrix dx;
-    MlpInputGradient<double>(shape, parameters.data(), dy, &activations, &dx);
+    MlpInputGradient<double>(parameters.data(), dy, &activations, &dx);
     ExpectNear(dx, ToMatrix(mlp["grad_x"]));
     ++cases;
   }
@@ -74,16 +74,16 @@ TEST_P(MlpDepth, GradientsAgreeWithDifferences) {
   };
   MlpForward<double>(shape, parameters.data(), x, &activations);
   Vector gradient;
-  MlpParameterGradient<double>(shape, parameters.data(), x, dy, &activations, &gradient);
+  MlpParameterGradient<double>(parameters.data(), x, dy, &activations, &gradient);
   ExpectIsGradient(
       gradient, [&](const Matrix& p) { return loss(p.data(), x); }, parameters);
   Matrix dx;
-  MlpInputGradient<double>(shape, parameters.data(), dy, &activations, &dx);
+  MlpInputGradient<double>(parameters.data(), dy, &activations, &dx);
   ExpectIsGradient(
       dx, [&](const Matrix& input) { return loss(parameters.data(), input); }, x);
   Matrix dx_of_deltas;
-  MlpParameterGradient<double>(shape, parameters.data(), x, dy, &activations, &gradient);
-  MlpInputGradientOfDeltas<double>(shape, parameters.data(), dy, activations, &dx_of_deltas);
+  MlpParameterGradient<double>(parameters.data(), x, dy, &activations, &gradient);
+  MlpInputGradientOfDeltas<double>(parameters.data(), dy, &activations, &dx_of_deltas);
   ExpectNear(dx_of_deltas, dx);
 }
 
@@ -97,14 +97,14 @@ TEST_P(MlpDepth, SamplesWithoutAGradientHaveNoneForTheirInput) {
   MlpActivations<double> activations;
   MlpForward<double>(shape, parameters.data(), x, &activations);
   Matrix expected, dx;
-  MlpInputGradient<double>(shape, parameters.data(), dy, &activations, &expected);
+  MlpInputGradient<double>(parameters.data(), dy, &activations, &expected);
   for (Eigen::Index j = 0; j < 900; ++j) {
     if (rng.Uniform() < 0.5 || (j >= 256 && j < 512)) {
       dy.col(j).setZero();
       expected.col(j).setZero();
     }
   }
-  MlpInputGradient<double>(shape, parameters.data(), dy, &activations, &dx);
+  MlpInputGradient<double>(parameters.data(), dy, &activations, &dx);
   ExpectNear(dx, expected);
 }
 
@@ -143,13 +143,6 @@ TEST(Mlp, CountsUsefulOperationsOfEachProductOnce) {
   const double products = 84 * 256 + 256 * 256 * 2 + 256 * 7;
   EXPECT_EQ(shape.ForwardFlops(256), 2 * 256 * products);
   EXPECT_EQ(shape.ParameterGradientFlops(256), 2 * 256 * (2 * products - 84 * 256));
-}
-
-TEST(Polyak, MovesTheTargetByTau) {
-  const Vector online = Vector::Constant(3, 2.0);
-  Vector target = Vector::Constant(3, 1.0);
-  PolyakUpdate<double>(online, 0.25, &target);
-  EXPECT_EQ(target, Vector::Constant(3, 1.25));
 }
 
 TEST(Adam, AgreesWithTheReference) {

@@ -61,7 +61,7 @@ TEST(MunchausenTest, TheLogIsClippedOnBothSides) {
 TEST(GaussianLikelihoodTest, TheWeightedFitHasItsGradient) {
   Rng rng(3);
   const MlpShape shape(3, {5}, 4);
-  TrainedNetwork<double> network(shape, 1e-3, /*with_target=*/false, rng);
+  TrainedNetwork<double> network(shape, {.learning_rate = 1e-3}, rng);
   const Vector parameters = network.parameters();
   BasicBatch<double> batch;
   batch.Resize({3, 2, 0}, 6, /*with_keys=*/false);

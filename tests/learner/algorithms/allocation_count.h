@@ -9,7 +9,8 @@ namespace dbr {
 // own.
 bool CountsAllocations();
 
-// The number of calls of malloc, calloc, realloc and their aligned versions so far, in all threads.
+// The number of calls of malloc, calloc, realloc and their aligned versions so far, in all threads, without
+// those that oneDNN makes inside of dnnl_primitive_execute.
 std::uint64_t AllocationCount();
 
 }  // namespace dbr

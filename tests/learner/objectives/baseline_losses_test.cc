@@ -32,7 +32,10 @@ class PolicyLossTest : public testing::Test {
  protected:
   Rng rng_{31};
   PairRunner runner_{1};
-  TwinCritic<double> critics_{MlpShape(kObservation + kDimensions, {6, 6}, 1), 1e-3, rng_, &runner_};
+  TwinCritic<double> critics_{MlpShape(kObservation + kDimensions, {6, 6}, 1),
+                              {.learning_rate = 1e-3, .with_target = true},
+                              rng_,
+                              &runner_};
   const Matrix observations_ = Normal(kObservation, kStates, rng_);
   const Matrix output_ = 0.5 * Normal(2 * kDimensions, kStates, rng_);
 };
@@ -137,7 +140,7 @@ TEST(AdvantageWeightsTest, DoNotLoseANaN) {
 // nothing.
 TEST(WeightedLikelihoodTest, GradientMatchesDifferencesWithTheWeightsConstant) {
   Rng rng(32);
-  TrainedNetwork<double> network(MlpShape(kObservation, {6}, 2 * kDimensions), 0, /*with_target=*/false, rng);
+  TrainedNetwork<double> network(MlpShape(kObservation, {6}, 2 * kDimensions), TrainingOptions{}, rng);
   BasicBatch<double> batch;
   batch.Resize({kObservation, kDimensions, 0}, kStates, /*with_keys=*/false);
   batch.observations = Normal(kObservation, kStates, rng);
@@ -145,7 +148,7 @@ TEST(WeightedLikelihoodTest, GradientMatchesDifferencesWithTheWeightsConstant) {
   const Vector weights = Normal(kStates, 1, rng).array().exp().matrix();
   GaussianLikelihood<double> likelihood(kBehaviorLogStd);
   const auto loss = [&](const Matrix& parameters) {
-    network.parameters() = parameters;
+    network.SetParameters(parameters);
     likelihood.Fit(batch, &weights, &network);
     return likelihood.loss();
   };

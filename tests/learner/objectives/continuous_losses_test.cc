@@ -119,7 +119,8 @@ TEST(SmallerMeanQTermTest, HasItsGradientsAndLeavesTheScaleConstant) {
 TEST(SoftPolicyObjectiveTest, GradientMatchesDifferences) {
   Rng rng(8);
   PairRunner runner(1);
-  TwinCritic<double> critics(MlpShape(kObservation + kDimensions, {6, 6}, 1), 1e-3, rng, &runner);
+  TwinCritic<double> critics(MlpShape(kObservation + kDimensions, {6, 6}, 1),
+                             {.learning_rate = 1e-3, .with_target = true}, rng, &runner);
   const Matrix observations = Normal(kObservation, kStates, rng), noise = Normal(kDimensions, kStates, rng);
   const Matrix output = 0.5 * Normal(2 * kDimensions, kStates, rng);
   SoftPolicyObjective<double> objective;
@@ -140,7 +141,8 @@ class BearObjectiveTest : public testing::TestWithParam<DbrConfig::Divergence> {
 TEST_P(BearObjectiveTest, GradientMatchesDifferences) {
   Rng rng(6);
   PairRunner runner(1);
-  TwinCritic<double> critics(MlpShape(kObservation + kDimensions, {6, 6}, 1), 1e-3, rng, &runner);
+  TwinCritic<double> critics(MlpShape(kObservation + kDimensions, {6, 6}, 1),
+                             {.learning_rate = 1e-3, .with_target = true}, rng, &runner);
   const Matrix observations = Normal(kObservation, kStates, rng);
   const Matrix actions = Normal(kDimensions, kDraws * kStates, rng);
   const Matrix noise = Normal(kDimensions, kDivergenceSamples * kStates, rng);
@@ -178,7 +180,9 @@ struct Case {
 
 class ObjectiveTest : public testing::TestWithParam<Case> {
  protected:
-  ObjectiveTest() : critics_(MlpShape(kObservation + kDimensions, {6, 6}, 1), 1e-3, rng_, &runner_) {
+  ObjectiveTest()
+      : critics_(MlpShape(kObservation + kDimensions, {6, 6}, 1),
+                 {.learning_rate = 1e-3, .with_target = true}, rng_, &runner_) {
     plus_.Split(0.5 * Normal(2 * kDimensions, kStates, rng_), kBehaviorLogStd);
     minus_.Split(0.5 * Normal(2 * kDimensions, kStates, rng_), kBehaviorLogStd);
     noise_ = {.actions = Normal(kDimensions, kDraws * kStates, rng_),

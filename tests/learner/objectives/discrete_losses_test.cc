@@ -91,7 +91,7 @@ TEST_P(PolicyLossTest, GradientThroughTheNetworkAgreesWithDifferences) {
   const PolicyLoss<double> at =
       Loss(MlpForward<double>(shape, parameters.data(), x, &activations), &d_logits);
   Vector gradient;
-  MlpParameterGradient<double>(shape, parameters.data(), x, d_logits, &activations, &gradient);
+  MlpParameterGradient<double>(parameters.data(), x, d_logits, &activations, &gradient);
   ExpectIsGradient(
       gradient,
       [&](const Matrix& p) {
@@ -180,7 +180,7 @@ TEST(CriticLoss, GradientThroughTheNetworkAgreesWithDifferences) {
   Matrix d_q;
   CriticLoss<double>(MlpForward<double>(shape, parameters.data(), x, &activations), actions, y, &d_q);
   Vector gradient;
-  MlpParameterGradient<double>(shape, parameters.data(), x, d_q, &activations, &gradient);
+  MlpParameterGradient<double>(parameters.data(), x, d_q, &activations, &gradient);
   ExpectIsGradient(
       gradient,
       [&](const Matrix& p) {
@@ -228,7 +228,7 @@ TEST_F(SoftPolicyLossTest, GradientThroughTheNetworkAgreesWithDifferences) {
   Matrix d_logits;
   Loss(MlpForward<double>(shape, parameters.data(), x, &activations), &d_logits);
   Vector gradient;
-  MlpParameterGradient<double>(shape, parameters.data(), x, d_logits, &activations, &gradient);
+  MlpParameterGradient<double>(parameters.data(), x, d_logits, &activations, &gradient);
   ExpectIsGradient(
       gradient,
       [&](const Matrix& p) {

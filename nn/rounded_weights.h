@@ -1,0 +1,48 @@
+// A network's weights in bfloat16, as its products read them.
+#pragma once
+
+#include <vector>
+
+#include "core/batch.h"
+#include "nn/mlp_shape.h"
+#include "nn/product/bfloat16.h"
+
+namespace dbr {
+
+// A rounded copy of the weights of a flat parameter vector, whose owner refreshes it when they change. The
+// biases are not in it: products take them in float32. Each weight is padded with rows and columns of zeros
+// (PaddedRows). It can be copied.
+class RoundedWeights {
+ public:
+  RoundedWeights() = default;  // of no network
+  explicit RoundedWeights(const MlpShape& shape);
+
+  bool empty() const { return weights_.empty(); }
+
+  // Rounds columns first ... first + n of a layer's weight from `column` on, [out x n], where they lie in the
+  // parameters side by side.
+  void Round(int layer, Eigen::Index first, Eigen::Index n, const float* column);
+  // Rounds all weights of `parameters` [parameter_count].
+  void RoundAll(const MlpShape& shape, const float* parameters);
+
+  // [PaddedRows(out) x PaddedRows(in)], column-major.
+  const MatrixX<Bfloat16>& weight(int layer) const { return weights_[layer]; }
+
+ private:
+  std::vector<MatrixX<Bfloat16>> weights_;
+  std::vector<Eigen::Index> outputs_;  // of each layer, without padding
+};
+
+// What products read of a network: its flat parameter vector and, where they are made in bfloat16, the
+// rounded copy of its weights. Owns nothing.
+template <class Scalar>
+struct MlpParameters {
+  MlpParameters(const Scalar* parameters, const RoundedWeights* rounded_weights = nullptr)
+      : values(parameters), rounded(rounded_weights) {}
+  MlpParameters(const VectorX<Scalar>& parameters) : MlpParameters(parameters.data()) {}
+
+  const Scalar* values;           // [parameter_count]
+  const RoundedWeights* rounded;  // null: products in Scalar's own precision
+};
+
+}  // namespace dbr
