@@ -22,7 +22,9 @@
 #include "learner/runtime/policy_service.h"
 #include "learner/runtime/rollout_reporter.h"
 #include "learner/runtime/trainer.h"
+#include "nn/precision.h"
 #include "nn/product/blas_setup.h"
+#include "nn/product/product_library.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/deadline.h"
 #include "proto/rpc/exit_status.h"
@@ -45,11 +47,14 @@ absl::StatusOr<AlgorithmSpec> MakeSpec(const Config& config) {
       const std::unique_ptr<Env> env,
       MakeEnv({.name = config.env().name(),
                .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
+  ASSIGN_OR_RETURN(const bool bfloat16, UsesBfloat16(config.network()));
+  spdlog::info("matrix products: {}", KernelsName(bfloat16));
   return AlgorithmSpec{.env = env->spec().name,
                        .observation_size = env->spec().observation_size,
                        .actions = env->spec().actions,
                        .hidden_sizes = HiddenSizes(config),
                        .normalize_observations = config.network().normalize_observations(),
+                       .bfloat16 = bfloat16,
                        .config = config.algorithm(),
                        .seed = config.seed()};
 }
