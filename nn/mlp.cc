@@ -34,8 +34,8 @@ void MlpParameterGradient(const MlpParameters<Scalar>& parameters, const ConstMa
 
 template <class Scalar>
 void MlpInputGradient(const MlpParameters<Scalar>& parameters, const ConstMatrixRef<Scalar>& dy,
-                      MlpActivations<Scalar>* activations, MatrixX<Scalar>* dx) {
-  WithPass(parameters, activations, [&](auto& pass) { pass.InputGradient(parameters, dy, dx); });
+                      Eigen::Index rows, MlpActivations<Scalar>* activations, MatrixX<Scalar>* dx) {
+  WithPass(parameters, activations, [&](auto& pass) { pass.InputGradient(parameters, dy, rows, dx); });
 }
 
 template <class Scalar>
@@ -66,7 +66,7 @@ VectorX<Scalar> InitialParameters(const MlpShape& shape, Rng& rng) {
                                              const ConstMatrixRef<Scalar>&, MlpActivations<Scalar>*,      \
                                              VectorX<Scalar>*);                                           \
   template void MlpInputGradient<Scalar>(const MlpParameters<Scalar>&, const ConstMatrixRef<Scalar>&,     \
-                                         MlpActivations<Scalar>*, MatrixX<Scalar>*);                      \
+                                         Eigen::Index, MlpActivations<Scalar>*, MatrixX<Scalar>*);        \
   template void MlpInputGradientOfDeltas<Scalar>(const MlpParameters<Scalar>&,                            \
                                                  const ConstMatrixRef<Scalar>&, MlpActivations<Scalar>*,  \
                                                  MatrixX<Scalar>*);                                       \

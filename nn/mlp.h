@@ -40,13 +40,15 @@ void MlpParameterGradient(const MlpParameters<Scalar>& parameters, const ConstMa
                           const ConstMatrixRef<Scalar>& dy, MlpActivations<Scalar>* activations,
                           VectorX<Scalar>* gradient);
 
-// The gradient of sum(dy .* y) with respect to x, [input x n], without the parameters' gradient, for the
-// activations of a forward pass with the same parameters. A sample whose column of dy is zero costs nothing.
+// The gradient of sum(dy .* y) with respect to the last `rows` rows of x, [rows x n], without the parameters'
+// gradient, for the activations of a forward pass with the same parameters. A sample whose column of dy is
+// zero costs nothing.
 template <class Scalar>
 void MlpInputGradient(const MlpParameters<Scalar>& parameters, const ConstMatrixRef<Scalar>& dy,
-                      MlpActivations<Scalar>* activations, MatrixX<Scalar>* dx);
+                      Eigen::Index rows, MlpActivations<Scalar>* activations, MatrixX<Scalar>* dx);
 
-// The same straight after MlpParameterGradient for the same dy, from the deltas that it left: one product.
+// The gradient with respect to all rows of x straight after MlpParameterGradient for the same dy, from the
+// deltas that it left: one product.
 template <class Scalar>
 void MlpInputGradientOfDeltas(const MlpParameters<Scalar>& parameters, const ConstMatrixRef<Scalar>& dy,
                               MlpActivations<Scalar>* activations, MatrixX<Scalar>* dx);

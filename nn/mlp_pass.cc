@@ -203,7 +203,9 @@ void MlpPass<Element>::Backpropagate(const Parameters& parameters, Columns<const
     }
     delta = previous;
   }
-  products_[0]->InputGradient(Layer(parameters, 0), delta, {dx.values, dx.rows, delta.cols, dx.stride});
+  LayerParameters<Element> input_layer = Layer(parameters, 0);
+  input_layer.weight += (shape_.input_size() - dx.rows) * input_layer.stride;
+  products_[0]->InputGradient(input_layer, delta, {dx.values, dx.rows, delta.cols, dx.stride});
 }
 
 template <class Element>
@@ -233,9 +235,9 @@ void MlpPass<Element>::PrepareInputGradient(const Parameters& parameters, Eigen:
 
 template <class Element>
 void MlpPass<Element>::InputGradient(const Parameters& parameters, const ConstMatrixRef<Sum>& dy,
-                                     MatrixX<Sum>* dx) {
+                                     Eigen::Index rows, MatrixX<Sum>* dx) {
   ResizeDeltas(dy.cols());
-  dx->resize(shape_.input_size(), dy.cols());
+  dx->resize(rows, dy.cols());
   for (Eigen::Index first = 0; first < dy.cols(); first += kBlockColumns) {
     const Eigen::Index n = std::min(kBlockColumns, dy.cols() - first);
     const Columns<Sum> block = ColumnsOf(dx, first, n);

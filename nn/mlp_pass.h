@@ -30,7 +30,8 @@ class MlpPass {
                               const ConstMatrixRef<Sum>& x);
   void ParameterGradient(const Parameters& parameters, const ConstMatrixRef<Sum>& x,
                          const ConstMatrixRef<Sum>& dy, VectorX<Sum>* gradient);
-  void InputGradient(const Parameters& parameters, const ConstMatrixRef<Sum>& dy, MatrixX<Sum>* dx);
+  void InputGradient(const Parameters& parameters, const ConstMatrixRef<Sum>& dy, Eigen::Index rows,
+                     MatrixX<Sum>* dx);
   void InputGradientOfDeltas(const Parameters& parameters, const ConstMatrixRef<Sum>& dy, MatrixX<Sum>* dx);
 
  private:
@@ -58,7 +59,8 @@ class MlpPass {
   // The columns of dy [out x n] that are not 0, side by side in active_dy_, and zeros up to a multiple of
   // kColumnGroup, but at most n.
   Eigen::Index GatherActive(const ConstMatrixRef<Sum>& dy, Eigen::Index first, Eigen::Index n);
-  // Sends the deltas of columns first ... of the block back through all layers, into dx.
+  // Sends the deltas of columns first ... of the block back through all layers, into dx: the gradient at the
+  // last dx.rows inputs.
   void Backpropagate(const Parameters& parameters, Columns<const Element> delta, Eigen::Index first,
                      Columns<Sum> dx);
   // Moves the first active_.count columns of dx to where they belong, in place; the others become zero.

@@ -1,7 +1,5 @@
 #include "nn/tanh_gaussian.h"
 
-#include <algorithm>
-#include <cmath>
 #include <numbers>
 
 #include "core/check.h"
@@ -9,21 +7,8 @@
 namespace dbr {
 namespace {
 
-// log(1 - tanh(u)^2) = 2 (log 2 - |u| - log(1 + exp(-2 |u|))): exact where tanh(u) rounds to 1.
-template <class Scalar>
-Scalar LogTanhSlope(Scalar u) {
-  const Scalar size = std::abs(u);
-  return 2 * (std::numbers::ln2_v<Scalar> - size - std::log1p(std::exp(-2 * size)));
-}
-
 template <class Scalar>
 constexpr Scalar kHalfLogTwoPi = Scalar(0.91893853320467274178);
-
-// The log-density of a normal at `z` deviations from its mean.
-template <class Scalar>
-Scalar LogNormal(Scalar z, Scalar log_std) {
-  return -z * z / 2 - log_std - kHalfLogTwoPi<Scalar>;
-}
 
 template <class Scalar>
 void CheckShape(const GaussianView<Scalar>& gaussian, const ConstMatrixRef<Scalar>& beside) {
@@ -47,7 +32,8 @@ void SampleTanhGaussian(const GaussianView<Scalar>& gaussian, const ConstMatrixR
                         TanhSample<Scalar>* sample) {
   SampleTanhActions(gaussian, noise, sample);
   constexpr Scalar kConstant = kHalfLogTwoPi<Scalar> + 2 * std::numbers::ln2_v<Scalar>;
-  // The logarithms of a normal's density less log(1 - tanh(u)^2), as LogTanhSlope has it, for whole matrices.
+  // The logarithm of a normal's density less log(1 - tanh(u)^2) = 2 (log 2 - |u| - log(1 + exp(-2 |u|))),
+  // which is exact where tanh(u) rounds to 1.
   const auto size = sample->before_tanh.array().abs();
   sample->terms = (-noise.array().square() / 2 - gaussian.log_std.array() - kConstant +
                    2 * (size + (1 + (-2 * size).exp()).log()))
@@ -62,17 +48,15 @@ void BackpropTanhSample(const GaussianView<Scalar>& gaussian, const ConstMatrixR
   CheckShape<Scalar>(gaussian, noise);
   CheckShape<Scalar>(gaussian, upstream.d_action);
   DBR_CHECK(upstream.d_log_prob.size() == noise.cols());
-  gradient->Resize(noise.rows(), noise.cols());
-  for (Eigen::Index j = 0; j < noise.cols(); ++j) {
-    const Scalar d_log_prob = upstream.d_log_prob[j];
-    for (Eigen::Index d = 0; d < noise.rows(); ++d) {
-      // d log_prob / du = 2 tanh(u): the density of the noise does not move with the sample.
-      const Scalar slope = std::exp(LogTanhSlope(sample.before_tanh(d, j)));
-      const Scalar d_u = upstream.d_action(d, j) * slope + d_log_prob * 2 * sample.action(d, j);
-      gradient->mean(d, j) = d_u;
-      gradient->log_std(d, j) = d_u * std::exp(gaussian.log_std(d, j)) * noise(d, j) - d_log_prob;
-    }
-  }
+  // d action / du = 1 - tanh(u)^2 = 4 e / (1 + e)^2 with e = exp(-2 |u|): exact where tanh(u) rounds to 1.
+  const auto e = (Scalar{-2} * sample.before_tanh.array().abs()).exp();
+  // d log_prob / du = 2 tanh(u): the density of the noise does not move with the sample.
+  const auto d_log_prob = upstream.d_log_prob.transpose().array().replicate(noise.rows(), 1);
+  gradient->mean = (upstream.d_action.array() * (Scalar{4} * e / (1 + e).square()) +
+                    Scalar{2} * d_log_prob * sample.action.array())
+                       .matrix();
+  gradient->log_std =
+      (gradient->mean.array() * gaussian.log_std.array().exp() * noise.array() - d_log_prob).matrix();
 }
 
 template <class Scalar>
@@ -80,21 +64,17 @@ void TanhLogProb(const GaussianView<Scalar>& gaussian, const ConstMatrixRef<Scal
                  VectorX<Scalar>* log_prob, GaussianGradient<Scalar>* gradient) {
   CheckShape<Scalar>(gaussian, actions);
   constexpr Scalar kLimit = static_cast<Scalar>(kActionLimit);
-  log_prob->resize(actions.cols());
-  if (gradient != nullptr) gradient->Resize(actions.rows(), actions.cols());
-  for (Eigen::Index j = 0; j < actions.cols(); ++j) {
-    Scalar sum = 0;
-    for (Eigen::Index d = 0; d < actions.rows(); ++d) {
-      const Scalar u = std::atanh(std::clamp(actions(d, j), -kLimit, kLimit));
-      const Scalar precision = std::exp(-gaussian.log_std(d, j));  // 1 / standard deviation
-      const Scalar z = (u - gaussian.mean(d, j)) * precision;
-      sum += LogNormal(z, gaussian.log_std(d, j)) - LogTanhSlope(u);
-      if (gradient == nullptr) continue;
-      gradient->mean(d, j) = z * precision;
-      gradient->log_std(d, j) = z * z - 1;
-    }
-    (*log_prob)[j] = sum;
-  }
+  constexpr Scalar kConstant = kHalfLogTwoPi<Scalar> + 2 * std::numbers::ln2_v<Scalar>;
+  gradient->Resize(actions.rows(), actions.cols());
+  auto first = gradient->mean.array(), second = gradient->log_std.array();
+  first = actions.array().max(-kLimit).min(kLimit);
+  first = (first.log1p() - (-first).log1p()) / 2;                     // u = atanh(a)
+  second = 2 * (first.abs() + (1 + (-2 * first.abs()).exp()).log());  // 2 log 2 - log(1 - tanh(u)^2)
+  first = (first - gaussian.mean.array()) * (-gaussian.log_std.array()).exp();  // z
+  second -= first.square() / 2 + gaussian.log_std.array() + kConstant;
+  *log_prob = gradient->log_std.colwise().sum().transpose();
+  second = first.square() - 1;
+  first *= (-gaussian.log_std.array()).exp();
 }
 
 #define DBR_INSTANTIATE(Scalar)                                                                          \

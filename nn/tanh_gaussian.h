@@ -44,7 +44,8 @@ void BackpropTanhSample(const GaussianView<Scalar>& gaussian, const ConstMatrixR
                         const TanhSample<Scalar>& sample, const TanhSampleGradient<Scalar>& upstream,
                         GaussianGradient<Scalar>* gradient);
 
-// log_prob [n] of given actions [dimensions x n] in [-1, 1], and the gradient of its sum (may be null).
+// log_prob [n] of given actions [dimensions x n] in [-1, 1], and the gradient of its sum, which serves as
+// workspace too.
 template <class Scalar>
 void TanhLogProb(const GaussianView<Scalar>& gaussian, const ConstMatrixRef<Scalar>& actions,
                  VectorX<Scalar>* log_prob, GaussianGradient<Scalar>* gradient);

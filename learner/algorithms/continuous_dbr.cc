@@ -60,7 +60,7 @@ template <class Scalar>
 const VectorX<Scalar>* ContinuousDbr<Scalar>::RewardBonus(const BasicBatch<Scalar>& batch) {
   const double weight = config().munchausen_weight();
   if (weight == 0) return nullptr;
-  TanhLogProb<Scalar>(beta_plus_.head().view(), batch.actions, &log_prob_, nullptr);
+  TanhLogProb<Scalar>(beta_plus_.head().view(), batch.actions, &log_prob_, &unused_gradient_);
   MunchausenBonus<Scalar>(weight, log_prob_, &bonus_);
   return &bonus_;
 }

@@ -78,6 +78,7 @@ class ContinuousDbr : public ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>> 
   ObjectiveNoise<Scalar> noise_;
   MatrixX<Scalar> next_noise_, d_output_;  // [dimensions x target_samples * n], [2 * dimensions x n]
   VectorX<Scalar> next_value_, value_, log_prob_, bonus_;  // [n]
+  GaussianGradient<Scalar> unused_gradient_;               // the workspace of a likelihood
   SelfImitation<Scalar> imitation_;
 };
 

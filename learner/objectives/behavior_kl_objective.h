@@ -44,7 +44,8 @@ class BehaviorKlObjective {
     gradient_.mean *= alpha / static_cast<Scalar>(n);
     gradient_.log_std *= alpha / static_cast<Scalar>(n);
     d_log_prob_.setZero(inputs.noise.cols());
-    draws_.Backprop(critics->InputGradient(q_term_.d_q1, q_term_.d_q2), d_log_prob_, &gradient_);
+    draws_.Backprop(critics->InputGradient(q_term_.d_q1, q_term_.d_q2, gradient_.mean.rows()), d_log_prob_,
+                    &gradient_);
     inputs.pi.Join(gradient_, d_output);
     const Scalar divergence = kl_.mean();
     return {q_term_.loss + alpha * divergence, q_term_.value, divergence, -draws_.sample().log_prob.mean()};

@@ -60,7 +60,7 @@ class DeterministicPolicyObjective {
     d_log_prob_.setZero(n);
     gradient_.mean.setZero(pi.mean().rows(), n);
     gradient_.log_std.setZero(pi.mean().rows(), n);
-    draws_.Backprop(critics->FirstInputGradient(d_q_), d_log_prob_, &gradient_);
+    draws_.Backprop(critics->FirstInputGradient(d_q_, pi.mean().rows()), d_log_prob_, &gradient_);
     pi.Join(gradient_, d_output);
   }
 

@@ -3,18 +3,11 @@
 #pragma once
 
 #include "core/batch.h"
-#include "core/rng.h"
 #include "nn/gaussian_head.h"
+#include "nn/normal_noise.h"
 #include "nn/tanh_gaussian.h"
 
 namespace dbr {
-
-// Fills `noise` [rows x cols] with standard normal noise, which a loss takes as an argument.
-template <class Scalar>
-void FillNormal(Rng& rng, Eigen::Index rows, Eigen::Index cols, MatrixX<Scalar>* noise) {
-  noise->resize(rows, cols);
-  for (Eigen::Index i = 0; i < noise->size(); ++i) noise->data()[i] = static_cast<Scalar>(rng.Normal());
-}
 
 // `count` draws for each of n states: draw k of state j is column k * n + j. Reused from batch to batch. One
 // thread at a time.
@@ -45,12 +38,11 @@ class SampledActions {
     return input_;
   }
 
-  // Adds to `gradient` [dimensions x n] the gradient that flows back from the critic's input (as CriticInput
-  // made it) and from the log-probabilities [count * n].
-  void Backprop(const MatrixX<Scalar>& d_input, const VectorX<Scalar>& d_log_prob,
+  // Adds to `gradient` [dimensions x n] the gradient that flows back from the actions [dimensions x count *
+  // n] and from the log-probabilities [count * n].
+  void Backprop(const MatrixX<Scalar>& d_action, const VectorX<Scalar>& d_log_prob,
                 GaussianGradient<Scalar>* gradient) {
-    BackpropTanhSample<Scalar>({mean_, log_std_}, noise_, sample_,
-                               {d_input.bottomRows(noise_.rows()), d_log_prob}, &each_);
+    BackpropTanhSample<Scalar>({mean_, log_std_}, noise_, sample_, {d_action, d_log_prob}, &each_);
     for (Eigen::Index k = 0; k < count_; ++k) {
       gradient->mean += each_.mean.middleCols(k * n_, n_);
       gradient->log_std += each_.log_std.middleCols(k * n_, n_);

@@ -39,7 +39,8 @@ class SampledQObjective {
     d_log_prob_.setConstant(log_prob.size(), options.entropy_weight / static_cast<Scalar>(log_prob.size()));
     gradient->mean.setZero(at.noise.rows(), n);
     gradient->log_std.setZero(at.noise.rows(), n);
-    draws_.Backprop(critics->InputGradient(q_term_.d_q1, q_term_.d_q2), d_log_prob_, gradient);
+    draws_.Backprop(critics->InputGradient(q_term_.d_q1, q_term_.d_q2, at.noise.rows()), d_log_prob_,
+                    gradient);
     const Scalar entropy = -log_prob.mean();
     return {q_term_.loss - options.entropy_weight * entropy, q_term_.value, entropy};
   }

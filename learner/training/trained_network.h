@@ -73,9 +73,9 @@ class TrainedNetwork {
   const MatrixX<Scalar>& ForwardForInput(const ConstMatrixRef<Scalar>& x) {
     return MlpForward<Scalar>(shape_, online(), x, &input_activations_);
   }
-  // Computes the gradient with respect to the x [input x n] of the newest ForwardForInput.
-  void InputGradient(const ConstMatrixRef<Scalar>& d_output, MatrixX<Scalar>* d_x) {
-    MlpInputGradient<Scalar>(online(), d_output, &input_activations_, d_x);
+  // Computes the gradient with respect to the last rows of the newest ForwardForInput's x, [rows x n].
+  void InputGradient(const ConstMatrixRef<Scalar>& d_output, Eigen::Index rows, MatrixX<Scalar>* d_x) {
+    MlpInputGradient<Scalar>(online(), d_output, rows, &input_activations_, d_x);
   }
   // Computes gradient() for the newest Forward(x) from the gradient of the loss with respect to its output
   // [output x n].

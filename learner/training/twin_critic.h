@@ -52,18 +52,18 @@ class TwinCritic {
   }
   const MatrixX<Scalar>& value1() const { return *first_.value; }
   const MatrixX<Scalar>& value2() const { return *second_.value; }
-  // Returns the gradient of sum(d_q1 .* q1 + d_q2 .* q2) with respect to the x [input x n] of the newest
-  // Evaluate.
-  const MatrixX<Scalar>& InputGradient(const ConstMatrixRef<Scalar>& d_q1,
-                                       const ConstMatrixRef<Scalar>& d_q2) {
-    runner_->Run([&] { first_.network.InputGradient(d_q1, &first_.d_x); },
-                 [&] { second_.network.InputGradient(d_q2, &second_.d_x); });
+  // Returns the gradient of sum(d_q1 .* q1 + d_q2 .* q2) with respect to the last rows of the newest
+  // Evaluate's x, [rows x n]: to the actions, which stand below the observations.
+  const MatrixX<Scalar>& InputGradient(const ConstMatrixRef<Scalar>& d_q1, const ConstMatrixRef<Scalar>& d_q2,
+                                       Eigen::Index rows) {
+    runner_->Run([&] { first_.network.InputGradient(d_q1, rows, &first_.d_x); },
+                 [&] { second_.network.InputGradient(d_q2, rows, &second_.d_x); });
     first_.d_x += second_.d_x;
     return first_.d_x;
   }
   // Returns the gradient of sum(d_q1 .* q1) alone.
-  const MatrixX<Scalar>& FirstInputGradient(const ConstMatrixRef<Scalar>& d_q1) {
-    first_.network.InputGradient(d_q1, &first_.d_x);
+  const MatrixX<Scalar>& FirstInputGradient(const ConstMatrixRef<Scalar>& d_q1, Eigen::Index rows) {
+    first_.network.InputGradient(d_q1, rows, &first_.d_x);
     return first_.d_x;
   }
 
@@ -105,7 +105,7 @@ class TwinCritic {
     TrainedNetwork<Scalar> network;
     MatrixX<Scalar> q;    // [outputs x n], kept by the newest Fit from before its step
     MatrixX<Scalar> d_q;  // [outputs x n]
-    MatrixX<Scalar> d_x;  // [input x n]
+    MatrixX<Scalar> d_x;  // [rows x n], set by InputGradient
     Scalar loss;
     const MatrixX<Scalar>* target = nullptr;  // [outputs x n], set by EvaluateTargets
     const MatrixX<Scalar>* value = nullptr;   // [outputs x n], set by Evaluate

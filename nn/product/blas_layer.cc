@@ -20,7 +20,8 @@ class BlasLayer final : public LayerProducts<Scalar> {
   }
   void HiddenGradient(const LayerParameters<Scalar>& layer, Columns<const Scalar> delta,
                       Columns<Scalar> dx) override {
-    Product(Transposed(Weight(layer)), OperandOf(delta), dx.values, dx.stride);
+    const Operand<Scalar> weight{layer.weight, size_.out, dx.rows, layer.stride};
+    Product(Transposed(weight), OperandOf(delta), dx.values, dx.stride);
   }
   void InputGradient(const LayerParameters<Scalar>& layer, Columns<const Scalar> delta,
                      Columns<Scalar> dx) override {

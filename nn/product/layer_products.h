@@ -58,7 +58,8 @@ class LayerProducts {
                       Columns<Element> y) = 0;
   // y [out x n] = W x + b, from x [in x n].
   virtual void Output(const LayerParameters<Element>& layer, Columns<const Element> x, Columns<Sum> y) = 0;
-  // dx [in x n] = W^T delta, from delta [out x n]: the gradient at another layer's output.
+  // dx = W^T delta, from delta [out x n]: the gradient at another layer's output. dx may have fewer rows than
+  // the layer has inputs: it is the gradient at the first ones then.
   virtual void HiddenGradient(const LayerParameters<Element>& layer, Columns<const Element> delta,
                               Columns<Element> dx) = 0;
   // The same at the network's input.

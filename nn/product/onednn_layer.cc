@@ -159,8 +159,8 @@ class OneDnnLayer final : public LayerProducts<Element> {
   template <class Result>
   void Backward(const LayerParameters<Element>& layer, const Columns<const Element>& delta,
                 const Columns<Result>& dx) {
-    const Matrix b{delta.rows, size_.in, {1, layer.stride}, TypeOf<Element>()};
-    Run({Samples(delta, delta.rows), b, Samples(dx, size_.in)}, delta.values, layer.weight, nullptr,
+    const Matrix b{delta.rows, dx.rows, {1, layer.stride}, TypeOf<Element>()};
+    Run({Samples(delta, delta.rows), b, Samples(dx, dx.rows)}, delta.values, layer.weight, nullptr,
         dx.values);
   }
 

@@ -284,7 +284,8 @@ TEST(SampledKlTest, IsTheDifferenceOfTheLogProbabilitiesOfTheDraws) {
   TanhSample<double> sample;
   SampleTanhGaussian<double>(p.view(), noise, &sample);
   Vector kl, under_q;
-  TanhLogProb<double>(q.view(), sample.action, &under_q, nullptr);
+  GaussianGradient<double> unused;
+  TanhLogProb<double>(q.view(), sample.action, &under_q, &unused);
   SampledKl<double>(p.view(), q.view(), noise, &kl, nullptr);
   ExpectNear(kl, sample.log_prob - under_q, 1e-8);
 }
@@ -346,7 +347,8 @@ TEST(TanhGaussianTest, LogProbGradientMatchesCentralDifferences) {
   const Matrix actions = Normals(3, 4, rng).array().tanh();
   const auto sum = [&](const Gaussian& at) {
     Vector log_prob;
-    TanhLogProb<double>(at.view(), actions, &log_prob, nullptr);
+    GaussianGradient<double> unused;
+    TanhLogProb<double>(at.view(), actions, &log_prob, &unused);
     return log_prob.sum();
   };
   Vector log_prob;
@@ -391,7 +393,8 @@ TEST(TanhGaussianTest, DensityIntegratesToOne) {
   Matrix actions(1, kPoints);
   for (int i = 0; i < kPoints; ++i) actions(0, i) = -1 + (i + 0.5) * 2 / kPoints;
   Vector log_prob;
-  TanhLogProb<double>({mean, log_std}, actions, &log_prob, nullptr);
+  GaussianGradient<double> unused;
+  TanhLogProb<double>({mean, log_std}, actions, &log_prob, &unused);
   EXPECT_NEAR(log_prob.array().exp().sum() * 2 / kPoints, 1.0, 1e-4);
 }
 

@@ -53,7 +53,7 @@ TEST(Mlp, AgreesWithTheReference) {
     MlpParameterGradient<double>(parameters.data(), x, dy, &activations, &gradient);
     ExpectNear(gradient, expected_gradient);
     Matrix dx;
-    MlpInputGradient<double>(parameters.data(), dy, &activations, &dx);
+    MlpInputGradient<double>(parameters.data(), dy, shape.input_size(), &activations, &dx);
     ExpectNear(dx, ToMatrix(mlp["grad_x"]));
     ++cases;
   }
@@ -78,7 +78,7 @@ TEST_P(MlpDepth, GradientsAgreeWithDifferences) {
   ExpectIsGradient(
       gradient, [&](const Matrix& p) { return loss(p.data(), x); }, parameters);
   Matrix dx;
-  MlpInputGradient<double>(parameters.data(), dy, &activations, &dx);
+  MlpInputGradient<double>(parameters.data(), dy, shape.input_size(), &activations, &dx);
   ExpectIsGradient(
       dx, [&](const Matrix& input) { return loss(parameters.data(), input); }, x);
   Matrix dx_of_deltas;
@@ -97,14 +97,14 @@ TEST_P(MlpDepth, SamplesWithoutAGradientHaveNoneForTheirInput) {
   MlpActivations<double> activations;
   MlpForward<double>(shape, parameters.data(), x, &activations);
   Matrix expected, dx;
-  MlpInputGradient<double>(parameters.data(), dy, &activations, &expected);
+  MlpInputGradient<double>(parameters.data(), dy, shape.input_size(), &activations, &expected);
   for (Eigen::Index j = 0; j < 900; ++j) {
     if (rng.Uniform() < 0.5 || (j >= 256 && j < 512)) {
       dy.col(j).setZero();
       expected.col(j).setZero();
     }
   }
-  MlpInputGradient<double>(parameters.data(), dy, &activations, &dx);
+  MlpInputGradient<double>(parameters.data(), dy, shape.input_size(), &activations, &dx);
   ExpectNear(dx, expected);
 }
 

@@ -77,7 +77,8 @@ TEST(GaussianLikelihoodTest, TheWeightedFitHasItsGradient) {
     GaussianHead<double> head;
     head.Split(MlpForward<double>(shape, at.data(), batch.observations, &activations), kBehaviorLogStd);
     Vector log_prob;
-    TanhLogProb<double>(head.view(), batch.actions, &log_prob, nullptr);
+    GaussianGradient<double> unused;
+    TanhLogProb<double>(head.view(), batch.actions, &log_prob, &unused);
     return -weights.dot(log_prob) / 6;
   };
   EXPECT_NEAR(loss_there, loss(parameters), 1e-12);
@@ -213,7 +214,8 @@ TYPED_TEST(Ablations, TheMunchausenTermIsBetaPlussOfTheSameUpdate) {
   } else {
     GaussianHead<double> head;
     head.Split(output, kBehaviorLogStd);
-    TanhLogProb<double>(head.view(), uniform.actions, &log_prob, nullptr);
+    GaussianGradient<double> unused;
+    TanhLogProb<double>(head.view(), uniform.actions, &log_prob, &unused);
   }
   double expected = 0;
   for (const double log : log_prob) expected += 0.9 * std::clamp(log, -1.0, 0.0) / 16;
