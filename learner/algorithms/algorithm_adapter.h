@@ -3,6 +3,7 @@
 #pragma once
 
 #include "learner/algorithm.h"
+#include "nn/flush_denormals.h"
 
 namespace dbr {
 
@@ -14,6 +15,7 @@ class AlgorithmAdapter final : public Algorithm {
 
   BatchNeeds needs() const override { return core_.needs(); }
   absl::Status Update(const UpdateBatches& batches) override {
+    const FlushDenormals flush;
     return core_.Update(batches.uniform, batches.plus, batches.minus);
   }
   absl::Span<const float> advantages() const override { return core_.advantages(); }

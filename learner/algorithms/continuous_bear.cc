@@ -26,6 +26,8 @@ absl::Status ContinuousBear<Scalar>::Update(const BasicBatch<Scalar>& uniform, c
                                             const BasicBatch<Scalar>&) {
   vae_.set_learning_rate(networks_.Begin());
   const Scalar behavior_loss = FitBehavior(uniform);
+  networks_.runner.Run([&] { next_.EvaluatePolicy(uniform.next_observations, &networks_.policy); },
+                       [&] { pi_.Split(networks_.policy.Forward(uniform.observations), kPolicyLogStd); });
   const Scalar critic_loss = FitCritics(uniform);
   const ConstrainedLoss<Scalar> policy_loss = ImprovePolicy(uniform);
   networks_.SetAdvantages(regression_.behavior_value() - value_);
@@ -47,7 +49,7 @@ Scalar ContinuousBear<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
              &next_noise_);
   const VectorX<Scalar>& next_value =
       next_.Compute(batch.next_observations, next_noise_, static_cast<Scalar>(config().target_min_weight()),
-                    &networks_.policy, &networks_.critics);
+                    &networks_.critics);
   return regression_.Fit(batch, networks_.spec.config.reward_scale(), next_value, &networks_.critics);
 }
 
@@ -59,7 +61,6 @@ ConstrainedLoss<Scalar> ContinuousBear<Scalar>::ImprovePolicy(const BasicBatch<S
   FillNormal(networks_.rng, vae_.shape().latent_size, samples * n, &latent_noise_);
   const MatrixX<Scalar>& behavior =
       vae_.Sample(batch.observations, latent_noise_, static_cast<Scalar>(config().vae_latent_limit()));
-  pi_.Split(networks_.policy.Forward(batch.observations), kPolicyLogStd);
   options_.use_q = networks_.UseQ();
   const ConstrainedLoss<Scalar> loss =
       objective_.Compute(options_, {{pi_, batch.observations, action_noise_}, divergence_noise_, behavior},

@@ -15,6 +15,7 @@ absl::Status ContinuousDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, co
                                            const BasicBatch<Scalar>& minus) {
   networks_.Begin();
   FitBehaviors(plus, minus);
+  EvaluatePolicy(uniform);
   ComputeNextValue(uniform);
   EvaluateBehaviors(uniform);
   const Scalar critic_loss = regression_.Fit(uniform, networks_.spec.config.reward_scale(), next_value_,
@@ -36,12 +37,17 @@ void ContinuousDbr<Scalar>::FitBehaviors(const BasicBatch<Scalar>& plus, const B
 }
 
 template <class Scalar>
+void ContinuousDbr<Scalar>::EvaluatePolicy(const BasicBatch<Scalar>& batch) {
+  networks_.runner.Run([&] { next_.EvaluatePolicy(batch.next_observations, &networks_.policy); },
+                       [&] { pi_.Split(networks_.policy.Forward(batch.observations), kPolicyLogStd); });
+}
+
+template <class Scalar>
 void ContinuousDbr<Scalar>::ComputeNextValue(const BasicBatch<Scalar>& batch) {
   const Eigen::Index n = batch.size();
   FillNormal(networks_.rng, networks_.spec.actions.size, config().target_samples() * n, &next_noise_);
-  next_value_ =
-      next_.Compute(batch.next_observations, next_noise_, static_cast<Scalar>(config().target_min_weight()),
-                    &networks_.policy, &networks_.critics);
+  next_value_ = next_.Compute(batch.next_observations, next_noise_,
+                              static_cast<Scalar>(config().target_min_weight()), &networks_.critics);
   if (config().value_penalty() && networks_.constrained) {
     DrawDivergenceNoise(n);
     penalty_.Compute({options_.divergence, options_.mmd_sigma}, next_.pi(),
@@ -77,7 +83,6 @@ void ContinuousDbr<Scalar>::DrawDivergenceNoise(Eigen::Index n) {
 template <class Scalar>
 PolicyLoss<Scalar> ContinuousDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
   const Eigen::Index n = batch.size();
-  pi_.Split(networks_.policy.Forward(batch.observations), kPolicyLogStd);
   FillNormal(networks_.rng, networks_.spec.actions.size, config().policy_samples() * n, &noise_.actions);
   DrawDivergenceNoise(n);
   options_.use_q = networks_.updates >= config().warm_start_updates();

@@ -56,7 +56,9 @@ class ContinuousDbr : public ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>> 
 
   const DbrConfig& config() const { return networks_.config(); }
   void FitBehaviors(const BasicBatch<Scalar>& plus, const BasicBatch<Scalar>& minus);
-  // Writes V'(s') [n] into next_value_.
+  // Evaluates pi' at s' and pi at s.
+  void EvaluatePolicy(const BasicBatch<Scalar>& batch);
+  // Writes V'(s') [n] into next_value_. EvaluatePolicy comes first.
   void ComputeNextValue(const BasicBatch<Scalar>& batch);
   // Evaluates beta+ and beta- at the batch's states.
   void EvaluateBehaviors(const BasicBatch<Scalar>& batch);

@@ -13,6 +13,7 @@ template <class Scalar>
 absl::Status Sac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,
                                  const BasicBatch<Scalar>&) {
   networks_.Begin();
+  EvaluatePolicy(uniform);
   const Scalar critic_loss = FitCritics(uniform);
   const SoftPolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
   networks_.Finish(policy_loss, target_entropy_);
@@ -21,11 +22,17 @@ absl::Status Sac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicB
 }
 
 template <class Scalar>
+void Sac<Scalar>::EvaluatePolicy(const BasicBatch<Scalar>& batch) {
+  networks_.runner.Run(
+      [&] { next_head_.Split(networks_.policy.Evaluate(batch.next_observations), kPolicyLogStd); },
+      [&] { head_.Split(networks_.policy.Forward(batch.observations), kPolicyLogStd); });
+}
+
+template <class Scalar>
 Scalar Sac<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
   const Eigen::Index n = batch.size();
-  head_.Split(networks_.policy.Evaluate(batch.next_observations), kPolicyLogStd);
   FillNormal(networks_.rng, networks_.spec.actions.size, n, &noise_);
-  next_draws_.Draw(head_, noise_);
+  next_draws_.Draw(next_head_, noise_);
   networks_.critics.EvaluateTargets(next_draws_.CriticInput(batch.next_observations));
   next_value_.resize(n);
   MeanOfSmaller<Scalar>(networks_.critics.target1(), networks_.critics.target2(), &next_value_);
@@ -36,7 +43,6 @@ Scalar Sac<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
 template <class Scalar>
 SoftPolicyLoss<Scalar> Sac<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
   const Eigen::Index n = batch.size();
-  head_.Split(networks_.policy.Forward(batch.observations), kPolicyLogStd);
   FillNormal(networks_.rng, networks_.spec.actions.size, n, &noise_);
   const SoftPolicyLoss<Scalar> loss = objective_.Compute(
       head_, batch.observations, noise_, networks_.temperature.value(), &networks_.critics, &d_output_);

@@ -41,12 +41,14 @@ class Sac : public ActorCriticAlgorithm<SoftNetworks<Scalar>> {
   using Base::metrics_;
   using Base::networks_;
 
+  // Evaluates the policy at s' and at s.
+  void EvaluatePolicy(const BasicBatch<Scalar>& batch);
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
   SoftPolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
 
   Scalar target_entropy_;  // nats
 
-  GaussianHead<Scalar> head_;
+  GaussianHead<Scalar> head_, next_head_;  // pi at s, pi at s'
   SampledActions<Scalar> next_draws_;
   SoftPolicyObjective<Scalar> objective_;
   CriticRegression<Scalar> regression_;

@@ -12,13 +12,15 @@ namespace dbr {
 template <class Scalar>
 class GreatestTarget {
  public:
-  // Returns V'(s') [n]: the greatest value of min_weight * min_i Q'_i + (1 - min_weight) * max_i Q'_i over
-  // draws from pi', the target of `policy` (Kumar et al. 2019, algorithm 1). noise [dimensions x count * n].
-  // No gradient is taken.
-  const VectorX<Scalar>& Compute(const MatrixX<Scalar>& next_observations, const MatrixX<Scalar>& noise,
-                                 Scalar min_weight, TrainedNetwork<Scalar>* policy,
-                                 TwinCritic<Scalar>* critics) {
+  // Evaluates pi', the target of `policy`, at s'. Compute needs it first.
+  void EvaluatePolicy(const MatrixX<Scalar>& next_observations, TrainedNetwork<Scalar>* policy) {
     pi_.Split(policy->ForwardTarget(next_observations), kPolicyLogStd);
+  }
+
+  // Returns V'(s') [n]: the greatest value of min_weight * min_i Q'_i + (1 - min_weight) * max_i Q'_i over
+  // draws from pi' (Kumar et al. 2019, algorithm 1). noise [dimensions x count * n]. No gradient is taken.
+  const VectorX<Scalar>& Compute(const MatrixX<Scalar>& next_observations, const MatrixX<Scalar>& noise,
+                                 Scalar min_weight, TwinCritic<Scalar>* critics) {
     draws_.DrawActions(pi_, noise);
     critics->EvaluateTargets(draws_.CriticInput(next_observations));
     value_.resize(next_observations.cols());

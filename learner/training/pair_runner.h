@@ -1,11 +1,15 @@
 // Runs two independent pieces of an update side by side.
 #pragma once
 
-#include <memory>
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+#include <atomic>
 #include <thread>
 
-#include "absl/base/thread_annotations.h"
 #include "absl/synchronization/mutex.h"
+#include "nn/flush_denormals.h"
 #include "proto/config.pb.h"
 
 namespace dbr {
@@ -17,8 +21,12 @@ inline int UpdateThreads(const AlgorithmConfig& config) {
   return std::thread::hardware_concurrency() >= 4 ? 2 : 1;
 }
 
-// Runs pairs of functions. With two threads the second function runs on a thread that the runner owns. The
-// results do not depend on the number of threads. One caller at a time. Run allocates nothing.
+// Runs pairs of functions. With two threads the second function runs on a thread that the runner owns, with
+// denormal numbers as zeros, as in the caller's (nn/flush_denormals.h). The results do not depend on the
+// number of threads. One caller at a time. Run allocates nothing.
+//
+// An update hands over some eight times, for parts of 50 microseconds and more. A thread that sleeps takes
+// about as long to wake, so that both threads first look for kLooks times whether the other has come.
 class PairRunner {
  public:
   explicit PairRunner(int threads) {
@@ -26,10 +34,7 @@ class PairRunner {
   }
   ~PairRunner() {
     if (!thread_.joinable()) return;
-    {
-      absl::MutexLock lock(&mutex_);
-      closed_ = true;
-    }
+    Hand(kClosed);
     thread_.join();
   }
   PairRunner(const PairRunner&) = delete;
@@ -43,41 +48,53 @@ class PairRunner {
       second();
       return;
     }
-    {
-      absl::MutexLock lock(&mutex_);
-      argument_ = &second;
-      call_ = [](const void* function) { (*static_cast<const Second*>(function))(); };
-    }
+    argument_ = &second;
+    call_ = [](const void* function) { (*static_cast<const Second*>(function))(); };
+    Hand(kSecond);
     first();
-    absl::MutexLock lock(&mutex_);
-    mutex_.Await(absl::Condition(this, &PairRunner::Idle));
+    AwaitTurn(kCaller);
   }
 
  private:
-  bool Idle() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return call_ == nullptr; }
-  bool HasWork() const ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex_) { return call_ != nullptr || closed_; }
+  enum Turn : int { kCaller, kSecond, kClosed };
+  static constexpr int kLooks = 2000;  // 30 to 90 microseconds, by the processor
+
+  // Says whose turn it is, and wakes the other thread if it sleeps.
+  void Hand(Turn turn) {
+    absl::MutexLock lock(&mutex_);
+    turn_.store(turn, std::memory_order_release);
+  }
+
+  // Blocks until the turn is `turn`, or kClosed.
+  void AwaitTurn(Turn turn) {
+    const auto has_come = [this, turn] {
+      const int now = turn_.load(std::memory_order_acquire);
+      return now == turn || now == kClosed;
+    };
+    for (int look = 0; look < kLooks; ++look) {
+      if (has_come()) return;
+#if defined(__x86_64__)
+      _mm_pause();
+#endif
+    }
+    absl::MutexLock lock(&mutex_);
+    mutex_.Await(absl::Condition(&has_come));
+  }
 
   void Work() {
+    const FlushDenormals flush;
     for (;;) {
-      void (*call)(const void*);
-      const void* argument;
-      {
-        absl::MutexLock lock(&mutex_);
-        mutex_.Await(absl::Condition(this, &PairRunner::HasWork));
-        if (closed_) return;
-        call = call_;
-        argument = argument_;
-      }
-      call(argument);
-      absl::MutexLock lock(&mutex_);
-      call_ = nullptr;
+      AwaitTurn(kSecond);
+      if (turn_.load(std::memory_order_acquire) == kClosed) return;
+      call_(argument_);
+      Hand(kCaller);
     }
   }
 
-  absl::Mutex mutex_;
-  void (*call_)(const void*) ABSL_GUARDED_BY(mutex_) = nullptr;
-  const void* argument_ ABSL_GUARDED_BY(mutex_) = nullptr;
-  bool closed_ ABSL_GUARDED_BY(mutex_) = false;
+  absl::Mutex mutex_;  // held where the turn changes, so that no wake-up is missed
+  std::atomic<int> turn_{kCaller};
+  void (*call_)(const void*) = nullptr;  // written by the caller before kSecond
+  const void* argument_ = nullptr;
   std::thread thread_;
 };
 

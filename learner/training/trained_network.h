@@ -134,7 +134,7 @@ class TrainedNetwork {
 
  private:
   // How many parameters a step takes through all its parts at once: they stay in the first-level cache.
-  static constexpr Eigen::Index kGroupEntries = 1024;
+  static constexpr Eigen::Index kGroupEntries = 512;
 
   static MlpParameters<Scalar> Parameters(const VectorX<Scalar>& values, const RoundedWeights& rounded) {
     return {values.data(), rounded.empty() ? nullptr : &rounded};
