@@ -59,7 +59,10 @@ void ContinuousDbr<Scalar>::ComputeNextValue(const BasicBatch<Scalar>& batch) {
 template <class Scalar>
 void ContinuousDbr<Scalar>::EvaluateBehaviors(const BasicBatch<Scalar>& batch) {
   networks_.runner.Run([&] { beta_plus_.At(batch.observations, &networks_.beta_plus); },
-                       [&] { beta_minus_.At(batch.observations, &networks_.beta_minus); });
+                       [&] {
+                         if (!IsMovedByMinus(config().constraint())) return;
+                         beta_minus_.At(batch.observations, &networks_.beta_minus);
+                       });
 }
 
 template <class Scalar>

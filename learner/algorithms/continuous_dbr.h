@@ -60,7 +60,7 @@ class ContinuousDbr : public ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>> 
   void EvaluatePolicy(const BasicBatch<Scalar>& batch);
   // Writes V'(s') [n] into next_value_. EvaluatePolicy comes first.
   void ComputeNextValue(const BasicBatch<Scalar>& batch);
-  // Evaluates beta+ and beta- at the batch's states.
+  // Evaluates beta+ at the states of the batch, and beta- where it can move the threshold.
   void EvaluateBehaviors(const BasicBatch<Scalar>& batch);
   // Returns the bonus that is added to the rewards [n], or null for none. EvaluateBehaviors comes first.
   const VectorX<Scalar>* RewardBonus(const BasicBatch<Scalar>& batch);

@@ -57,7 +57,10 @@ void DiscreteDbr<Scalar>::ComputeTargets(const BasicBatch<Scalar>& batch) {
 template <class Scalar>
 void DiscreteDbr<Scalar>::EvaluateBehaviors(const BasicBatch<Scalar>& batch) {
   networks_.runner.Run([&] { beta_plus_.At(batch.observations, batch.masks, &networks_.beta_plus); },
-                       [&] { beta_minus_.At(batch.observations, batch.masks, &networks_.beta_minus); });
+                       [&] {
+                         if (!IsMovedByMinus(config().constraint())) return;
+                         beta_minus_.At(batch.observations, batch.masks, &networks_.beta_minus);
+                       });
 }
 
 template <class Scalar>

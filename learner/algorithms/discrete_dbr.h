@@ -56,7 +56,7 @@ class DiscreteDbr : public ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>> {
   const DbrConfig& config() const { return networks_.config(); }
   void FitBehaviors(const BasicBatch<Scalar>& plus, const BasicBatch<Scalar>& minus);
   void ComputeTargets(const BasicBatch<Scalar>& batch);
-  // Evaluates beta+ and beta- at the batch's states.
+  // Evaluates beta+ at the states of the batch, and beta- where it can move the threshold.
   void EvaluateBehaviors(const BasicBatch<Scalar>& batch);
   // Adds the Munchausen term to target_. EvaluateBehaviors comes first.
   void RaiseRewards(const BasicBatch<Scalar>& batch);

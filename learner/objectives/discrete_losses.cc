@@ -148,9 +148,12 @@ PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, cons
                                           const Categorical<Scalar>& beta_plus,
                                           const Categorical<Scalar>& beta_minus, Scalar alpha,
                                           PolicyLossWorkspace<Scalar>* workspace, MatrixX<Scalar>* d_logits) {
-  Divergence(options.divergence, static_cast<Scalar>(options.mmd_sigma), policy, beta_minus,
-             &workspace->minus, &workspace->d_minus);
-  const Scalar divergence_minus = workspace->minus.mean();
+  Scalar divergence_minus = 0;
+  if (IsMovedByMinus(options.constraint)) {
+    Divergence(options.divergence, static_cast<Scalar>(options.mmd_sigma), policy, beta_minus,
+               &workspace->minus, &workspace->d_minus);
+    divergence_minus = workspace->minus.mean();
+  }
   const Threshold<Scalar> threshold =
       ThresholdOf(options.constraint, static_cast<Scalar>(options.epsilon), divergence_minus);
   const Scalar weight = options.constraint == DbrConfig::NONE ? Scalar{0} : alpha;

@@ -67,10 +67,16 @@ struct PolicyLoss {
   Scalar loss = 0;              // the objective with alpha as a constant
   Scalar value = 0;             // E[min_i E_pi Q_i(s, a)]
   Scalar divergence_plus = 0;   // mean D(pi, beta+)
-  Scalar divergence_minus = 0;  // mean D(pi, beta-)
+  Scalar divergence_minus = 0;  // mean D(pi, beta-); 0 unless it can move the threshold (IsMovedByMinus)
   Scalar threshold = 0;         // c; 0 without a constraint
   Scalar entropy = 0;           // mean, nats
 };
+
+// Whether the threshold depends on D(pi, beta-). Where it does not, beta- is not evaluated at the states of
+// the batch.
+inline bool IsMovedByMinus(DbrConfig::Constraint constraint) {
+  return constraint == DbrConfig::DYNAMIC_MAX || constraint == DbrConfig::DYNAMIC_MIN;
+}
 
 template <class Scalar>
 struct Threshold {

@@ -29,9 +29,11 @@ void DualBehaviorObjective<Scalar>::AddConstraint(const PolicyLossOptions& optio
                                                   PolicyLoss<Scalar>* result) {
   const GaussianDivergenceOptions kind{options.divergence, options.mmd_sigma};
   plus_.Compute(kind, heads.pi, heads.beta_plus, {noise.pi, noise.plus});
-  minus_.Compute(kind, heads.pi, heads.beta_minus, {noise.pi, noise.minus});
   result->divergence_plus = plus_.value().mean();
-  result->divergence_minus = minus_.value().mean();
+  if (IsMovedByMinus(options.constraint)) {
+    minus_.Compute(kind, heads.pi, heads.beta_minus, {noise.pi, noise.minus});
+    result->divergence_minus = minus_.value().mean();
+  }
   const Threshold<Scalar> threshold =
       ThresholdOf(options.constraint, static_cast<Scalar>(options.epsilon), result->divergence_minus);
   result->threshold = threshold.value;

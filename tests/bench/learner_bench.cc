@@ -69,6 +69,18 @@ AlgorithmSpec With(AlgorithmSpec spec, const Set& set) {
 void Dbr(AlgorithmConfig& config) {
   config.mutable_dbr()->set_divergence(DbrConfig::MMD_EXACT);
 }
+// DBR as deploy/configs has it for the robots.
+void DbrOfTheConfigs(AlgorithmConfig& config) {
+  DbrConfig& dbr = *config.mutable_dbr();
+  dbr.set_constraint(DbrConfig::DYNAMIC_MIN);
+  dbr.set_divergence(DbrConfig::MMD_EXACT);
+  dbr.set_epsilon(0.1);
+  dbr.set_normalize_q(true);
+  dbr.set_behavior_batch_size(128);
+  dbr.set_target_min_weight(1);
+  dbr.set_target_samples(1);
+  dbr.set_policy_samples(2);
+}
 // DBR over discrete actions with KL, the default.
 void DiscreteDbr(AlgorithmConfig& config) {
   config.mutable_dbr();
@@ -146,6 +158,7 @@ const bool kUpdatesRegistered = [] {
   add("ddqn/connect4", Connect4(), Ddqn);
   add("sac/hopper", Hopper(), Sac);
   add("dbr/hopper", Hopper(), Dbr);
+  add("dbr_of_the_configs/hopper", Hopper(), DbrOfTheConfigs);
   add("dbr/ant", Ant(), Dbr);
   add("bear/ant", Ant(), Bear);
   add("brac/ant", Ant(), Brac);

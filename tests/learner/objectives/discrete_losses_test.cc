@@ -160,7 +160,7 @@ TEST(PolicyLoss, ThresholdFollowsTheConstraint) {
     options.epsilon = epsilon;
     return DualBehaviorPolicyLoss<double>(options, pi, q, q, plus, minus, 1.0, &workspace, &gradient);
   };
-  const double divergence = threshold(DbrConfig::FIXED, 0.05).divergence_minus;
+  const double divergence = threshold(DbrConfig::DYNAMIC_MAX, 0.05).divergence_minus;
   ASSERT_GT(divergence, 0.05);
   EXPECT_EQ(threshold(DbrConfig::FIXED, 0.05).threshold, 0.05);
   EXPECT_EQ(threshold(DbrConfig::DYNAMIC_MAX, 0.05).threshold, divergence);
