@@ -16,6 +16,7 @@
 #include "absl/strings/str_cat.h"
 
 extern "C" void openblas_set_num_threads(int threads);
+extern "C" char* openblas_get_corename();
 
 namespace dbr {
 namespace {
@@ -24,7 +25,7 @@ constexpr char kThreads[] = "OPENBLAS_NUM_THREADS";
 constexpr char kKernel[] = "OPENBLAS_CORETYPE";
 // This kernel multiplies and adds halves of a vector at once, which is right where a processor splits vectors
 // anyway.
-constexpr char kOtherKernel[] = "Excavator";
+constexpr char kFirstZenKernel[] = "Excavator";
 
 // What OpenBLAS takes for a thread's products: BUFFER_SIZE of its kernels for x86-64.
 constexpr std::size_t kBytesOfABuffer = std::size_t{128} << 20;
@@ -92,19 +93,37 @@ bool SlowKernel() {
   return share > 1.3;
 }
 
-bool RunsOtherKernel() {
+std::string ChooseKernel(const ProcessorFeatures& processor, const std::string& own,
+                         const std::function<bool()>& slow) {
+  if (processor.first_zen) return slow() ? kFirstZenKernel : "";
+  if (!processor.avx2_fma) return "";
+  for (const char* good : {"Haswell", "Zen", "SkylakeX", "Cooperlake", "SapphireRapids"}) {
+    if (own == good) return "";
+  }
+  return processor.avx512 ? "SkylakeX" : "Haswell";
+}
+
+std::string BetterKernel() {
+  ProcessorFeatures processor;
 #if defined(__x86_64__)
-  return __builtin_cpu_supports("fma4") != 0 || __builtin_cpu_is("znver1") != 0;
-#else
-  return false;
+  processor.first_zen = __builtin_cpu_supports("fma4") != 0 || __builtin_cpu_is("znver1") != 0;
+  processor.avx2_fma = __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
+  processor.avx512 = __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512cd") != 0 &&
+                     __builtin_cpu_supports("avx512bw") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
+                     __builtin_cpu_supports("avx512vl") != 0;
 #endif
+  return ChooseKernel(processor, openblas_get_corename(), SlowKernel);
 }
 
 void RestartWithBlasSetUp(char** argv) {
   const char* threads = std::getenv(kThreads);
   if (threads != nullptr && std::strcmp(threads, "1") == 0) return;
   UseOneBlasThread();  // also where the program cannot be executed again: at least no product uses them
-  if (RunsOtherKernel() && SlowKernel()) setenv(kKernel, kOtherKernel, /*overwrite=*/0);
+  if (std::getenv(kKernel) == nullptr) {
+    if (const std::string better = BetterKernel(); !better.empty()) {
+      setenv(kKernel, better.c_str(), /*overwrite=*/1);
+    }
+  }
   setenv(kThreads, "1", /*overwrite=*/1);
   // By its path, so that lists of processes show the program's name.
   std::error_code error;

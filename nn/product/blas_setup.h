@@ -2,6 +2,9 @@
 // with a kernel that suits the processor.
 #pragma once
 
+#include <functional>
+#include <string>
+
 #include "absl/status/status.h"
 
 namespace dbr {
@@ -11,9 +14,10 @@ void UseOneBlasThread();
 
 // Sets OpenBLAS up for a whole program and the programs that it starts. Belongs in the first line of main,
 // before signals are blocked: it executes the program again in the same process, with OPENBLAS_NUM_THREADS=1
-// and, where RunsOtherKernel() and SlowKernel() say so, OPENBLAS_CORETYPE. OpenBLAS reads both while it is
-// loaded and starts its threads then, before main can block a signal: such a thread would take a SIGTERM and
-// the program would die without draining. Does nothing where OPENBLAS_NUM_THREADS is 1 already.
+// and, where OpenBLAS's own choice of kernel does not suit the processor, OPENBLAS_CORETYPE=BetterKernel(),
+// unless that is set already. OpenBLAS reads both while it is loaded and starts its threads then, before main
+// can block a signal: such a thread would take a SIGTERM and the program would die without draining. Does
+// nothing where OPENBLAS_NUM_THREADS is 1 already.
 void RestartWithBlasSetUp(char** argv);
 
 // Checks that `threads` threads can multiply at once. OpenBLAS takes a buffer of address space for each, and
@@ -22,17 +26,30 @@ void RestartWithBlasSetUp(char** argv);
 // others can still be told; it takes and gives back the address space and touches no memory.
 absl::Status CheckBlasMemory(int threads);
 
+// The kernel of OpenBLAS to take in place of its own choice, by the instructions that the processor executes;
+// "" where its own choice is good. OpenBLAS 0.3.21 chooses by the processor's model and has two kinds of
+// fault:
+//   - A model that it does not know gets the kernel of 2004, for SSE3: on Intel's Emerald Rapids 22 GFLOP/s,
+//     where its kernel for AVX-512 makes 150. With AVX2 and FMA, a kernel without them is never right.
+//   - AMD's first Zen gets a kernel of 10 GFLOP/s where a plain loop makes 20, and OpenBLAS's kernel for an
+//     older AMD processor 33. That is measured (SlowKernel), in 2 ms, or 20 where the kernel is slow.
+std::string BetterKernel();
+
+// What BetterKernel goes by. `own` is OpenBLAS's choice, as it names it; `slow` is called at most once.
+struct ProcessorFeatures {
+  bool avx512 = false;  // F, CD, BW, DQ and VL
+  bool avx2_fma = false;
+  bool first_zen = false;  // FMA4 without AVX2's speed: AMD's, the first Zen, which does not say so, included
+};
+std::string ChooseKernel(const ProcessorFeatures& processor, const std::string& own,
+                         const std::function<bool()>& slow);
+
 // A matrix product by a plain loop: c = a b, all column-major [kTrialSize x kTrialSize].
 inline constexpr int kTrialSize = 64;
 void PlainProduct(const float* a, const float* b, float* c);
 
-// True where OpenBLAS's own choice of kernel, by the processor's model, is slower than 1 / 1.3 of a plain
-// loop: it then does not suit the processor. (OpenBLAS 0.3.21 on AMD's first Zen: 10 GFLOP/s, a plain loop
-// 20, and OpenBLAS's kernel for an older AMD processor 33.) Takes 2 ms, or 20 where the kernel is slow.
+// True where OpenBLAS's product takes longer than 1.3 times a plain loop's: its kernel does not suit the
+// processor then. A busy machine may make it seem so anywhere.
 bool SlowKernel();
-
-// True where the processor executes all instructions of the kernel that is taken in place of a slow one:
-// FMA4, which only AMD's processors have. Its first Zen executes them and does not say so.
-bool RunsOtherKernel();
 
 }  // namespace dbr

@@ -20,19 +20,38 @@ TEST(BlasSetUp, ThePlainProductIsAProduct) {
   EXPECT_LT((c - expected).cwiseAbs().maxCoeff(), 1e-4f);
 }
 
-// On a busy machine SlowKernel may take its own timing's noise for a slow kernel, on any processor.
-TEST(BlasSetUp, TakesAnotherKernelOnlyWhereItsInstructionsRun) {
+constexpr auto kFast = [] { return false; };
+constexpr auto kSlow = [] { return true; };
+
+// OpenBLAS takes the kernel named Prescott, for SSE3, where it does not know the processor's model.
+TEST(BlasSetUp, AProcessorThatOpenBlasDoesNotKnowGetsAKernelForItsInstructions) {
+  EXPECT_EQ(ChooseKernel({.avx512 = true, .avx2_fma = true}, "Prescott", kFast), "SkylakeX");
+  EXPECT_EQ(ChooseKernel({.avx2_fma = true}, "Prescott", kFast), "Haswell");
+  EXPECT_EQ(ChooseKernel({.avx2_fma = true}, "Sandybridge", kFast), "Haswell");
+  EXPECT_EQ(ChooseKernel({}, "Prescott", kSlow), "");  // it knows no better instructions
+}
+
+TEST(BlasSetUp, AKernelForTheProcessorStays) {
+  for (const char* own : {"Haswell", "Zen", "SkylakeX", "Cooperlake", "SapphireRapids"}) {
+    EXPECT_EQ(ChooseKernel({.avx512 = true, .avx2_fma = true}, own, kSlow), "") << own;
+  }
+}
+
+TEST(BlasSetUp, TheFirstZenGetsAnotherKernelWhereItsOwnIsSlow) {
+  EXPECT_EQ(ChooseKernel({.avx2_fma = true, .first_zen = true}, "Zen", kSlow), "Excavator");
+  EXPECT_EQ(ChooseKernel({.avx2_fma = true, .first_zen = true}, "Zen", kFast), "");
+}
+
+// The kernel must be one that the processor can execute.
+TEST(BlasSetUp, TakesNoKernelWhoseInstructionsTheProcessorLacks) {
   std::ifstream cpuinfo("/proc/cpuinfo");
-  std::string line, vendor, flags;
+  std::string line, flags;
   while (std::getline(cpuinfo, line)) {
-    if (line.rfind("vendor_id", 0) == 0) vendor = line;
     if (line.rfind("flags", 0) == 0) flags = line + " ";
   }
-  if (vendor.find("AuthenticAMD") == std::string::npos) {
-    EXPECT_FALSE(RunsOtherKernel()) << vendor;
-  } else if (flags.find(" fma4 ") != std::string::npos) {
-    EXPECT_TRUE(RunsOtherKernel());
-  }
+  const std::string kernel = BetterKernel();
+  if (kernel == "SkylakeX") EXPECT_THAT(flags, testing::HasSubstr(" avx512vl "));
+  if (kernel == "Haswell") EXPECT_THAT(flags, testing::HasSubstr(" avx2 "));
 }
 
 TEST(BlasSetUp, TooLittleAddressSpaceIsFoundBeforeTheFirstProduct) {
