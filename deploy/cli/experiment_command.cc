@@ -22,6 +22,7 @@
 #include "deploy/manual/number_option.h"
 #include "deploy/terminal/output.h"
 #include "deploy/terminal/terminal.h"
+#include "nn/precision.h"
 #include "proto/config/experiment_file.h"
 
 namespace dbr {
@@ -71,6 +72,12 @@ absl::StatusOr<int> RunExperiment(const ExperimentFlags& flags) {
   if (flags.dry_run) {
     PrintPlan(grid);
     return 0;
+  }
+  for (const Cell& cell : grid.cells) {
+    if (const absl::Status precision = UsesBfloat16(cell.config.network()).status(); !precision.ok()) {
+      return absl::InvalidArgumentError(absl::StrCat("task '", cell.task, "', contender '", cell.contender,
+                                                     "': ", std::string(precision.message())));
+    }
   }
   RETURN_IF_ERROR(WriteDescription(experiment, grid));
   ExperimentOptions options = flags.run;

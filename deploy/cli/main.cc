@@ -16,6 +16,7 @@
 #include "deploy/launch/commit.h"
 #include "deploy/manual/man_page.h"
 #include "nn/product/blas_setup.h"
+#include "nn/product/product_library.h"
 #include "proto/config/config_fields.h"
 
 namespace {
@@ -54,6 +55,15 @@ bool WithUnknownCommand(const CLI::App& app, int argc, char** argv) {
   return true;
 }
 
+// What multiplies matrices on this machine, in each precision that there is.
+std::string Kernels() {
+  const std::string float32 = absl::StrCat("matrix products: ", dbr::KernelsName(/*bfloat16=*/false));
+  if (!dbr::HasBfloat16()) {
+    return absl::StrCat(float32, "; no bfloat16: the processor has ", dbr::ProcessorInstructions());
+  }
+  return absl::StrCat(float32, "; ", dbr::KernelsName(/*bfloat16=*/true));
+}
+
 int Main(int argc, char** argv) {
   CLI::App app("Dual Behavior Regularized reinforcement learning: trains, watches and examines policies.",
                "dbr");
@@ -62,8 +72,9 @@ int Main(int argc, char** argv) {
       "Each command has its own --help. The files deploy/... of the examples come with dbr, wherever it is\n"
       "installed; where the working folder has a file of that name, that one is taken.\n\n"
       "Example: dbr launch deploy/configs/connect4.textproto");
-  app.set_version_flag("--version", absl::StrCat("dbr ", DBR_VERSION, ", commit ", dbr::BuildCommit()),
-                       "Print the version and the commit that dbr was built from");
+  app.set_version_flag(
+      "--version", absl::StrCat("dbr ", DBR_VERSION, ", commit ", dbr::BuildCommit(), "\n", Kernels()),
+      "Print the version, the commit that dbr was built from and what multiplies matrices here");
   int exit_code = 0;
   dbr::AddLaunch(&app, &exit_code);
   dbr::AddStats(&app, &exit_code);

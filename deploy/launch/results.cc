@@ -94,13 +94,10 @@ absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder) {
   for (const EvaluationPoint& point : summary.curve.points()) evaluations.push_back(ToJson(point));
   Json final_results = Json::array();
   for (const EvaluationResult& result : summary.final_results) final_results.push_back(ToJson(result));
-  Json json = {{"env", summary.env},
-               {"algorithm", summary.algorithm},
-               {"seed", summary.seed},
-               {"config", summary.config},
-               {"commit", summary.commit},
-               {"run_folder", folder.root},
-               {"ended", std::string(TextOf(summary.ended))}};
+  Json json = {{"env", summary.env},        {"algorithm", summary.algorithm},
+               {"seed", summary.seed},      {"config", summary.config},
+               {"commit", summary.commit},  {"kernels", summary.kernels},
+               {"run_folder", folder.root}, {"ended", std::string(TextOf(summary.ended))}};
   if (!summary.failure.empty()) json["failure"] = summary.failure;
   if (summary.seed_buffer.rows > 0) {
     json["seed_buffer"] = SeedBufferJson(summary.seed_buffer);

@@ -18,6 +18,7 @@
 #include "envs/registry/registry.h"
 #include "learner/algorithm.h"
 #include "learner/algorithms/registry.h"
+#include "nn/precision.h"
 #include "proto/config/config_file.h"
 #include "proto/rpc/address.h"
 #include "replay/service/replay_server.h"
@@ -180,6 +181,7 @@ absl::StatusOr<RunPlan> PrepareRun(const LaunchOptions& options, absl::Time now)
   ASSIGN_OR_RETURN(plan.config, LoadForLaunch(options));
   ASSIGN_OR_RETURN(plan.env, EnvSpecOf(plan.config));
   RETURN_IF_ERROR(CheckFits(plan.config, plan.env));
+  RETURN_IF_ERROR(UsesBfloat16(plan.config.network()).status());
   const ReplayConfig& replay = plan.config.replay();
   const LearnerConfig& learner = plan.config.learner();
   RETURN_IF_ERROR(CheckAddressToTell(replay, "replay"));

@@ -17,6 +17,7 @@ Config Identity(const Config& config) {
   identity.set_seed(whole.seed());
   *identity.mutable_env() = whole.env();
   *identity.mutable_network() = whole.network();
+  identity.mutable_network()->clear_precision();
   *identity.mutable_algorithm() = whole.algorithm();
   identity.mutable_algorithm()->clear_learning_rate();
   identity.mutable_algorithm()->clear_learning_rate_decay_updates();

@@ -131,7 +131,8 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
                      .metrics = metrics.get(),
                      .saver = &saver,
                      .prefetcher = MakePrefetcher(config, spec, needs, &draws),
-                     .relabeller = std::make_unique<Relabeller>(&labels)};
+                     .relabeller = std::make_unique<Relabeller>(&labels),
+                     .kernels = KernelsName(spec.bfloat16)};
   Trainer trainer(learner, std::move(parts));
   if (arguments.resume) RETURN_IF_ERROR(Resume(arguments.folder, learner, &trainer));
   RETURN_IF_ERROR(metrics->StartSession(static_cast<std::int64_t>(trainer.updates()), absl::Now()));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <string>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
@@ -29,6 +30,7 @@ struct TrainerParts {
   Saver* saver = nullptr;
   std::unique_ptr<Prefetcher> prefetcher;
   std::unique_ptr<Relabeller> relabeller;
+  std::string kernels;  // that make the matrix products, for people (nn/product/product_library.h)
 };
 
 // Load, StartVersionsAfter and Run are for one thread, in this order; Stop may be called from any.

@@ -25,7 +25,7 @@ const std::map<std::string, std::vector<std::string>>& Readers() {
   static const auto* const readers = new std::map<std::string, std::vector<std::string>>{
       {"Config", {"actor", "learner", "replay", "deploy"}},
       {"EnvConfig", {"actor", "learner", "replay", "deploy"}},
-      {"NetworkConfig", {"learner", "proto"}},
+      {"NetworkConfig", {"learner", "nn", "proto"}},
       {"AlgorithmConfig", {"actor", "learner", "replay"}},
       {"DbrConfig", {"learner", "replay"}},
       {"ReplayConfig", {"replay"}},
