@@ -13,11 +13,12 @@ namespace {
 template <class Element>
 inline constexpr bool kRounds = !std::is_same_v<Element, SumOf<Element>>;
 
-// Sizes `matrix` to [PaddedRows(rows) x n]. The rows that are added are 0, and stay so: nothing writes them.
+// Gives `matrix` PaddedRows(rows) rows and n columns or more: the number of samples with a gradient changes
+// from batch to batch. The rows that are added are 0, and stay so: nothing writes them.
 template <class Element>
 void ResizePadded(Eigen::Index rows, Eigen::Index n, MatrixX<Element>* matrix) {
   const Eigen::Index padded = PaddedRows<Element>(rows);
-  if (matrix->rows() == padded && matrix->cols() == n) return;
+  if (matrix->rows() == padded && matrix->cols() >= n) return;
   matrix->resize(padded, n);
   if constexpr (kRounds<Element>) matrix->setZero();
 }

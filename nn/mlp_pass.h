@@ -70,6 +70,7 @@ class MlpPass {
 
   MlpShape shape_;
   std::vector<std::unique_ptr<LayerProducts<Element>>> products_;  // of each layer
+  // Some have more columns than the newest batch.
   std::vector<MatrixX<Element>> hidden_;  // [out x n] each hidden layer's output after its ReLU, padded
   std::vector<MatrixX<Element>> deltas_;  // [in x n] the gradient at each layer's input but the first's
   MatrixX<Element> input_, d_output_;     // [in x n], [out x n] rounded and padded, for Bfloat16

@@ -11,6 +11,7 @@
 #include "learner/algorithms/registry.h"
 #include "learner/training/learning_rate.h"
 #include "nn/policy.h"
+#include "nn/product/product_library.h"
 #include "tests/learner/algorithms/allocation_count.h"
 #include "tests/learner/algorithms/batches.h"
 
@@ -34,10 +35,11 @@ AlgorithmSpec SpecOf(const AlgorithmId& id, std::uint64_t seed = 1) {
   return spec;
 }
 
-// An algorithm with its defaults, or with one of its variants.
+// An algorithm with its defaults, or with one of its variants, in one of the two precisions.
 struct Member {
   AlgorithmId id;
   std::string variant;  // a name in kVariants; empty: the defaults
+  bool bfloat16 = false;
 };
 
 struct Variant {
@@ -63,15 +65,19 @@ AlgorithmSpec SpecOf(const Member& member, std::uint64_t seed = 1) {
   for (const Variant& variant : kVariants) {
     if (member.variant == variant.name) variant.set(&spec);
   }
+  spec.bfloat16 = member.bfloat16;
   return spec;
 }
 
 std::vector<Member> Members() {
   std::vector<Member> members;
-  for (const AlgorithmId& id : Algorithms()) {
-    members.push_back({id, ""});
-    for (const Variant& variant : kVariants) {
-      if (id.name == variant.algorithm) members.push_back({id, variant.name});
+  for (const bool bfloat16 : {false, true}) {
+    if (bfloat16 && !HasBfloat16()) break;
+    for (const AlgorithmId& id : Algorithms()) {
+      members.push_back({id, "", bfloat16});
+      for (const Variant& variant : kVariants) {
+        if (id.name == variant.algorithm) members.push_back({id, variant.name, bfloat16});
+      }
     }
   }
   return members;
@@ -123,6 +129,21 @@ TEST_P(Conformance, SavingAndLoadingContinuesBitForBit) {
   }
   EXPECT_EQ(StateOf(*algorithm_).tensors, StateOf(*loaded).tensors);
   EXPECT_EQ(StateOf(*algorithm_).metadata, StateOf(*loaded).metadata);
+}
+
+TEST_P(Conformance, TheStateOfTheOtherPrecisionIsContinued) {
+  if (!HasBfloat16()) GTEST_SKIP() << "the processor has no bfloat16";
+  Member other = GetParam();
+  other.bfloat16 = !other.bfloat16;
+  const auto before = MakeAlgorithm(SpecOf(other));
+  for (int i = 0; i < 3; ++i) Update(before->get());
+  ASSERT_TRUE(algorithm_->Load(StateOf(**before)).ok());
+  EXPECT_EQ(StateOf(*algorithm_).tensors, StateOf(**before).tensors);
+  for (const auto& algorithm : {algorithm_.get(), before->get()}) {
+    rng_ = Rng(5);
+    Update(algorithm);
+  }
+  EXPECT_NE(StateOf(*algorithm_).tensors, StateOf(**before).tensors) << "the precision has no effect";
 }
 
 TEST_P(Conformance, LoadingNamesAMissingOrMisshapenTensor) {
@@ -251,7 +272,8 @@ TEST_P(Conformance, TwoThreadsGiveWhatOneGives) {
 
 INSTANTIATE_TEST_SUITE_P(Registry, Conformance, testing::ValuesIn(Members()), [](const auto& info) {
   const AlgorithmId& id = info.param.id;
-  return id.name + (id.actions == ActionKind::kDiscrete ? "Discrete" : "Continuous") + info.param.variant;
+  return id.name + (id.actions == ActionKind::kDiscrete ? "Discrete" : "Continuous") + info.param.variant +
+         (info.param.bfloat16 ? "Bfloat16" : "");
 });
 
 TEST(LearningRateTest, FallsLinearlyToItsEndAndStaysThere) {
