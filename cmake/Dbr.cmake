@@ -101,6 +101,14 @@ function(dbr_binary name)
   dbr_use_precompiled(${name} tool)
 endfunction()
 
+# dbr_test_on_older_processor(NAME): runs the whole test program NAME once more as on a processor with AVX2 alone, where OpenBLAS
+# makes the products and there is no bfloat16.
+function(dbr_test_on_older_processor name)
+  add_test(NAME ${name}/OnAProcessorWithAvx2Alone COMMAND ${name} --gtest_brief=1)
+  set_tests_properties(${name}/OnAProcessorWithAvx2Alone PROPERTIES
+    TIMEOUT 300 ENVIRONMENT "OPENBLAS_NUM_THREADS=1;DNNL_MAX_CPU_ISA=AVX2")
+endfunction()
+
 # dbr_test(NAME SRCS a_test.cc DEPS libs... LABELS slow TIMEOUT 60 PROGRAMS dbr dbr-actor CORES 2): a GoogleTest program.
 # ctest finds its tests in it and runs each by itself, as NAME/Suite.Test: several at once, TIMEOUT seconds at most for each
 # (120 unless it is given). PROGRAMS are built before it; a test that starts whole runs takes CORES of those that ctest shares out.

@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,11 @@ constexpr char kKernel[] = "OPENBLAS_CORETYPE";
 // This kernel multiplies and adds halves of a vector at once, which is right where a processor splits vectors
 // anyway.
 constexpr char kFirstZenKernel[] = "Excavator";
+// OpenBLAS's kernels for processors without FMA, by its names. The first is what it takes for a model that it
+// does not know.
+constexpr const char* kKernelsWithoutFma[] = {"Prescott",   "Core2",   "Atom",    "Penryn",
+                                              "Dunnington", "Nehalem", "Opteron", "Opteron_SSE3",
+                                              "Barcelona",  "Nano",    "Bobcat",  "Sandybridge"};
 
 // What OpenBLAS takes for a thread's products: BUFFER_SIZE of its kernels for x86-64.
 constexpr std::size_t kBytesOfABuffer = std::size_t{128} << 20;
@@ -97,9 +103,8 @@ std::string ChooseKernel(const ProcessorFeatures& processor, const std::string& 
                          const std::function<bool()>& slow) {
   if (processor.first_zen) return slow() ? kFirstZenKernel : "";
   if (!processor.avx2_fma) return "";
-  for (const char* good : {"Haswell", "Zen", "SkylakeX", "Cooperlake", "SapphireRapids"}) {
-    if (own == good) return "";
-  }
+  const auto is_own = [&own](const char* name) { return own == name; };
+  if (std::none_of(std::begin(kKernelsWithoutFma), std::end(kKernelsWithoutFma), is_own)) return "";
   return processor.avx512 ? "SkylakeX" : "Haswell";
 }
 
@@ -117,13 +122,11 @@ std::string BetterKernel() {
 
 void RestartWithBlasSetUp(char** argv) {
   const char* threads = std::getenv(kThreads);
-  if (threads != nullptr && std::strcmp(threads, "1") == 0) return;
+  const bool one_thread = threads != nullptr && std::strcmp(threads, "1") == 0;
+  const std::string better = std::getenv(kKernel) == nullptr ? BetterKernel() : "";
+  if (one_thread && better.empty()) return;
   UseOneBlasThread();  // also where the program cannot be executed again: at least no product uses them
-  if (std::getenv(kKernel) == nullptr) {
-    if (const std::string better = BetterKernel(); !better.empty()) {
-      setenv(kKernel, better.c_str(), /*overwrite=*/1);
-    }
-  }
+  if (!better.empty()) setenv(kKernel, better.c_str(), /*overwrite=*/1);
   setenv(kThreads, "1", /*overwrite=*/1);
   // By its path, so that lists of processes show the program's name.
   std::error_code error;

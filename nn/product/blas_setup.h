@@ -17,7 +17,7 @@ void UseOneBlasThread();
 // and, where OpenBLAS's own choice of kernel does not suit the processor, OPENBLAS_CORETYPE=BetterKernel(),
 // unless that is set already. OpenBLAS reads both while it is loaded and starts its threads then, before main
 // can block a signal: such a thread would take a SIGTERM and the program would die without draining. Does
-// nothing where OPENBLAS_NUM_THREADS is 1 already.
+// nothing where both are as they should be.
 void RestartWithBlasSetUp(char** argv);
 
 // Checks that `threads` threads can multiply at once. OpenBLAS takes a buffer of address space for each, and

@@ -32,7 +32,8 @@ TEST(BlasSetUp, AProcessorThatOpenBlasDoesNotKnowGetsAKernelForItsInstructions) 
 }
 
 TEST(BlasSetUp, AKernelForTheProcessorStays) {
-  for (const char* own : {"Haswell", "Zen", "SkylakeX", "Cooperlake", "SapphireRapids"}) {
+  for (const char* own :
+       {"Haswell", "Zen", "SkylakeX", "Cooperlake", "SapphireRapids", "Excavator", "ANewerOne"}) {
     EXPECT_EQ(ChooseKernel({.avx512 = true, .avx2_fma = true}, own, kSlow), "") << own;
   }
 }
