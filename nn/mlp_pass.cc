@@ -77,6 +77,11 @@ void MlpPass<Element>::SetShape(const MlpShape& shape) {
   if (shape == shape_) return;
   shape_ = shape;
   prepared_columns_ = 0;
+  // What another shape left in rows that are padding now would not be 0.
+  hidden_.clear();
+  deltas_.clear();
+  input_.resize(0, 0);
+  d_output_.resize(0, 0);
   products_.clear();
   for (int layer = 0; layer < shape.layer_count(); ++layer) {
     products_.push_back(MakeLayerProducts<Element>({shape.in(layer), shape.out(layer)}));

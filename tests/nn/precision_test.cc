@@ -94,6 +94,22 @@ TEST(MlpActivationsTest, ServeNetworksOfTwoShapesInTurn) {
   }
 }
 
+// Rows that are padding for one network hold numbers of another: a NaN among them must not stay.
+TEST(MlpActivationsTest, ABrokenNetworkLeavesNothingToTheNext) {
+  if (!HasBfloat16()) GTEST_SKIP() << "the processor has no bfloat16";
+  Rng rng(6);
+  const MlpShape wide(7, {30}, 2), narrow(7, {20}, 2);
+  const VectorX<float> broken = VectorX<float>::Constant(wide.parameter_count(), NAN);
+  const VectorX<float> sound = InitialParameters<float>(narrow, rng);
+  RoundedWeights of_broken(wide), of_sound(narrow);
+  of_broken.RoundAll(wide, broken.data());
+  of_sound.RoundAll(narrow, sound.data());
+  const Matrix x = Normal(7, 9, rng);
+  MlpActivations<float> activations;
+  MlpForward<float>(wide, {broken.data(), &of_broken}, x, &activations);
+  EXPECT_TRUE(MlpForward<float>(narrow, {sound.data(), &of_sound}, x, &activations).allFinite());
+}
+
 TEST(PrecisionTest, AsksForBfloat16WhereTheProcessorHasIt) {
   NetworkConfig config;
   EXPECT_EQ(config.precision(), NetworkConfig::AUTO);
