@@ -117,7 +117,8 @@ absl::StatusOr<int> Launch::Conclude(const Stopped& stopped) {
       ", ", WithCommas(summary().transitions), " transitions, ", WithCommas(summary().updates),
       " updates in ", Clock(absl::Seconds(summary().training_s)),
       stopped.services_saved ? "; all is saved" : absl::StrCat("; NOT all could be saved, see ", log)));
-  if (!summary().kernels.empty()) Say(absl::StrCat("the learner multiplied with ", summary().kernels));
+  if (!summary().matrix_products.empty())
+    Say(absl::StrCat("the learner multiplied with ", summary().matrix_products));
   if (stopped.services_saved && !stopped.actors_ended)
     Say(absl::StrCat("an actor or the evaluator did not end by itself, see ", log));
   bool interrupted = stopped.by_signal;

@@ -96,7 +96,7 @@ absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder) {
   for (const EvaluationResult& result : summary.final_results) final_results.push_back(ToJson(result));
   Json json = {{"env", summary.env},        {"algorithm", summary.algorithm},
                {"seed", summary.seed},      {"config", summary.config},
-               {"commit", summary.commit},  {"kernels", summary.kernels},
+               {"commit", summary.commit},  {"matrix_products", summary.matrix_products},
                {"run_folder", folder.root}, {"ended", std::string(TextOf(summary.ended))}};
   if (!summary.failure.empty()) json["failure"] = summary.failure;
   if (summary.seed_buffer.rows > 0) {

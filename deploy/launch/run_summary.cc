@@ -23,7 +23,7 @@ std::vector<EvaluationPoint> RunSummary::Update(const RunSample& sample) {
   if (sample.learner.has_value()) {
     updates = sample.learner->updates();
     policy_version = sample.learner->policy_version();
-    if (!sample.learner->kernels().empty()) kernels = sample.learner->kernels();
+    if (!sample.learner->matrix_products().empty()) matrix_products = sample.learner->matrix_products();
   }
   return curve.Update(sample);
 }

@@ -35,9 +35,9 @@ struct RunSummary {
   std::string env;
   std::string algorithm;
   std::uint64_t seed = 0;
-  std::string config;  // the file that the run was launched with
-  std::string commit;  // that the newest launch's programs were built from (deploy/launch/commit.h)
-  std::string kernels;  // that made the newest learner's matrix products; empty until it has told them
+  std::string config;           // the file that the run was launched with
+  std::string commit;           // that the newest launch's programs were built from (deploy/launch/commit.h)
+  std::string matrix_products;  // what made the newest learner's; empty until it has told
   RunEnding ended = RunEnding::kNone;
   std::string failure;    // why a failed one failed
   double wall_s = 0;      // from the start of the processes to their end, over all launches of the run

@@ -143,7 +143,7 @@ absl::StatusOr<RunSummary> LoadSummary(const RunFolder& folder) {
   summary.seed = Count(json, "seed");
   summary.config = Text(json, "config");
   summary.commit = Text(json, "commit");
-  summary.kernels = Text(json, "kernels");
+  summary.matrix_products = Text(json, "matrix_products");
   summary.failure = Text(json, "failure");
   ReadCounters(json, &summary);
   if (const Json& seed_buffer = Part(json, "seed_buffer"); !seed_buffer.empty())

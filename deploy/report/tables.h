@@ -16,7 +16,8 @@ void AddResults(const Runs& runs, const std::vector<Row>& rows, Document* docume
 void AddAblationTable(const Runs& runs, const std::vector<Row>& rows, const std::vector<int>& family,
                       Document* document);
 
-// Each cell: state, commit, time, updates, steps, how it ended, its config's digest; and why cells failed.
+// Each cell: state, commit, time, updates, steps, how it ended, its config's digest, the kernels of its
+// learner; and why cells failed.
 void AddCells(const Runs& runs, Document* document);
 
 // What the config of each task and contender sets.

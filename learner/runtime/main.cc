@@ -127,12 +127,12 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
       stats(arguments.replay_address);
   const BatchNeeds needs = algorithm->needs();
   TrainerParts parts{.algorithm = std::move(algorithm),
+                     .matrix_products = KernelsName(spec.bfloat16),
                      .policy_service = &service,
                      .metrics = metrics.get(),
                      .saver = &saver,
                      .prefetcher = MakePrefetcher(config, spec, needs, &draws),
-                     .relabeller = std::make_unique<Relabeller>(&labels),
-                     .kernels = KernelsName(spec.bfloat16)};
+                     .relabeller = std::make_unique<Relabeller>(&labels)};
   Trainer trainer(learner, std::move(parts));
   if (arguments.resume) RETURN_IF_ERROR(Resume(arguments.folder, learner, &trainer));
   RETURN_IF_ERROR(metrics->StartSession(static_cast<std::int64_t>(trainer.updates()), absl::Now()));

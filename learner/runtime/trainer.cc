@@ -110,7 +110,7 @@ void Trainer::SetStatus(bool finished) {
   const double since_record = static_cast<double>(updates_ - updates_at_record_);
   status.set_updates_per_second(seconds > 1 ? since_record / seconds : updates_per_second_);
   status.set_finished(finished);
-  status.set_kernels(parts_.kernels);
+  status.set_matrix_products(parts_.matrix_products);
   for (const UpdateMetric& metric : parts_.algorithm->metrics()) {
     Metric* entry = status.add_metrics();
     entry->set_name(metric.name);

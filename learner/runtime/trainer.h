@@ -25,12 +25,12 @@ class PolicyService;
 // What a trainer works with. The three pointers are not owned and outlive the trainer.
 struct TrainerParts {
   std::unique_ptr<Algorithm> algorithm;
+  std::string matrix_products;  // what makes them, for people (nn/product/product_library.h)
   PolicyService* policy_service = nullptr;
   MetricsSink* metrics = nullptr;
   Saver* saver = nullptr;
   std::unique_ptr<Prefetcher> prefetcher;
   std::unique_ptr<Relabeller> relabeller;
-  std::string kernels;  // that make the matrix products, for people (nn/product/product_library.h)
 };
 
 // Load, StartVersionsAfter and Run are for one thread, in this order; Stop may be called from any.

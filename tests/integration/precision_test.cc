@@ -59,7 +59,7 @@ TEST(PrecisionTest, ARunGoesOnInAnotherPrecision) {
   };
   const auto [begun, first] = launch({SmallConfig(), "--set", "learner.max_updates=200"}, {});
   ASSERT_EQ(begun, 0) << first;
-  const std::string kernels = Summary(run).value("kernels", "");
+  const std::string kernels = Summary(run).value("matrix_products", "");
   EXPECT_NE(kernels, "");
   EXPECT_THAT(first, HasSubstr("the learner multiplied with " + kernels));
 
@@ -68,7 +68,7 @@ TEST(PrecisionTest, ARunGoesOnInAnotherPrecision) {
              kOlderProcessor);
   ASSERT_EQ(resumed, 0) << second;
   EXPECT_EQ(Summary(run)["updates"], 400);
-  EXPECT_THAT(Summary(run).value("kernels", ""), testing::ContainsRegex("^OpenBLAS .*, float32$"));
+  EXPECT_THAT(Summary(run).value("matrix_products", ""), testing::ContainsRegex("^OpenBLAS .*, float32$"));
   EXPECT_THAT(Contents(run.log("learner")), HasSubstr("at update 200"));
 }
 

@@ -106,6 +106,7 @@ StatsReply SomeStats() {
 LearnerStatus SomeStatus() {
   LearnerStatus status;
   status.set_updates(4000);
+  status.set_matrix_products("a library, bfloat16");
   status.set_policy_version(82);
   status.set_updates_per_second(410);
   status.set_subscribers(2);
@@ -282,8 +283,20 @@ TEST(ResultsTest, SummaryKeepsItsCountersOverAResume) {
   EXPECT_EQ(read.missed_evaluations, 7);
   EXPECT_EQ(read.ended, RunEnding::kInterrupted);
   EXPECT_EQ(read.commit, "abc+changes");
+  EXPECT_EQ(json["matrix_products"], "a library, bfloat16");
+  EXPECT_EQ(read.matrix_products, "a library, bfloat16");
   ASSERT_EQ(read.final_results.size(), 1);
   EXPECT_EQ(ToJson(read.final_results[0]), ToJson(summary.final_results[0]));
+}
+
+TEST(ResultsTest, SummaryKeepsTheKernelsWhileALearnerDoesNotSayThemYet) {
+  RunSummary summary;
+  RunSample sample;
+  sample.learner = SomeStatus();
+  summary.Update(sample);
+  sample.learner->clear_matrix_products();
+  summary.Update(sample);
+  EXPECT_EQ(summary.matrix_products, "a library, bfloat16");
 }
 
 TEST(ResultsTest, SummaryNamesTheIterationsThatWereNotEvaluated) {

@@ -124,6 +124,14 @@ TEST_F(RunPlanTest, ResumesUnderAnotherLearningRate) {
   EXPECT_EQ(LoadConfig(plan->folder.config())->algorithm().learning_rate(), 1e-4);
 }
 
+TEST_F(RunPlanTest, ResumesInAnotherPrecision) {
+  ASSERT_TRUE(PrepareRun(Options(), kNow).ok());  // AUTO
+  MakeStore();
+  const auto plan = PrepareRun(Options({"network.precision=FLOAT32"}, true), kNow);
+  ASSERT_TRUE(plan.ok()) << plan.status();
+  EXPECT_EQ(plan->config.network().precision(), NetworkConfig::FLOAT32);
+}
+
 TEST_F(RunPlanTest, RefusesToResumeAnotherRunAndNamesTheFields) {
   ASSERT_TRUE(PrepareRun(Options(), kNow).ok());
   MakeStore();

@@ -39,6 +39,16 @@ TEST(LearnerProgram, AReplayServerOfAnotherEnvironmentEndsItForGood) {
       << "it has made no update that would be worth to be kept: " << output;
 }
 
+TEST(LearnerProgram, APrecisionThatTheProcessorLacksEndsItForGood) {
+  const TempDir folder;
+  const RunFolder run{folder.path()};
+  std::ofstream(run.config()) << "network { precision: BFLOAT16 }";
+  const auto [status, output] =
+      RunProgram("dbr-learner", {"--config", run.config(), "--run-dir", run.root}, {"DNNL_MAX_CPU_ISA=AVX2"});
+  EXPECT_EQ(status, 2) << output;
+  EXPECT_THAT(output, testing::HasSubstr("network.precision: BFLOAT16 needs a processor with"));
+}
+
 TEST(LearnerProgram, AWrongConfigAndDamagedCheckpointsEndItForGood) {
   const TempDir folder;
   const RunFolder run{folder.path()};

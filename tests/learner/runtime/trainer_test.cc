@@ -77,6 +77,7 @@ class TrainerTest : public testing::Test {
     config.set_push_every(push_every);
     config.set_metrics_every(10);
     TrainerParts parts{.algorithm = std::move(algorithm),
+                       .matrix_products = "a library, float32",
                        .policy_service = &service_,
                        .metrics = metrics_.get(),
                        .saver = &saver_,
@@ -130,6 +131,15 @@ TEST_F(TrainerTest, TrainsWritesAdvantagesBackAndSaves) {
   const auto policy = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
   ASSERT_TRUE(policy.ok()) << policy.status();
   EXPECT_EQ(policy->updates, kUpdates);
+}
+
+TEST_F(TrainerTest, TellsWhatMakesItsMatrixProducts) {
+  Insert(100);
+  RunToTheEnd(MakeTrainer(kUpdates).get());
+  const LearnerStatusRequest request;
+  LearnerStatus status;
+  service_.Status(nullptr, &request, &status);
+  EXPECT_EQ(status.matrix_products(), "a library, float32");
 }
 
 // Follows the advantage ARM_CUMULATIVE from the config to the labels in the store: A_T = max(A_{T-1}, 0) + (Q

@@ -102,6 +102,8 @@ TEST(ParseConfigTest, NamesValuesOfAnotherType) {
               ElementsAre(HasSubstr("expected a number, found 'high'")));
   EXPECT_THAT(ErrorsOf("learner { allow_insecure: maybe }"),
               ElementsAre(HasSubstr("true or false, found 'maybe'")));
+  EXPECT_THAT(ErrorsOf("network { precision: HALF }"),
+              ElementsAre("1:22: network.precision: expected one of FLOAT32, BFLOAT16, AUTO, found 'HALF'"));
 }
 
 TEST(ParseConfigTest, NamesFieldsGivenTwice) {
