@@ -59,6 +59,7 @@ RunSummary BeginSummary(const RunPlan& plan) {
   summary.seed = plan.config.seed();
   summary.config = plan.config_source;
   summary.commit = BuildCommit();
+  summary.matrix_products.clear();  // until this launch's learner has told them
   summary.seed_buffer.path = plan.config.replay().seed_buffer().path();
   summary.offline_updates = plan.config.learner().offline_updates();
   summary.every_updates = plan.config.evaluation().every_updates();
