@@ -102,6 +102,22 @@ std::string SetBool(absl::string_view text, const FieldDescriptor& field, Messag
   return "";
 }
 
+// "did you mean 'x'?" with the known name nearest to `name`, or "" where none is near.
+std::string Question(const std::string& name, const std::vector<std::string>& known) {
+  const std::string lower = absl::AsciiStrToLower(name);
+  std::size_t best = std::numeric_limits<std::size_t>::max();
+  const std::string* nearest = nullptr;
+  for (const std::string& candidate : known) {
+    const std::size_t distance = EditDistance(lower, absl::AsciiStrToLower(candidate));
+    if (distance < best) {
+      best = distance;
+      nearest = &candidate;
+    }
+  }
+  const bool is_near = nearest != nullptr && best <= std::max<std::size_t>(2, nearest->size() / 3);
+  return is_near ? absl::StrCat("did you mean '", *nearest, "'?") : "";
+}
+
 std::string SetEnum(absl::string_view text, const FieldDescriptor& field, Message* message) {
   const std::string name(text);
   const EnumValueDescriptor* value = field.enum_type()->FindValueByName(name);
@@ -111,8 +127,9 @@ std::string SetEnum(absl::string_view text, const FieldDescriptor& field, Messag
     std::vector<std::string> names;
     for (int i = 0; i < field.enum_type()->value_count(); ++i)
       names.push_back(field.enum_type()->value(i)->name());
-    return absl::StrCat(Expected(absl::StrCat("one of ", absl::StrJoin(names, ", ")), text), "; ",
-                        Suggest(name, names));
+    const std::string nearest = Question(name, names);
+    return absl::StrCat(Expected(absl::StrCat("one of ", absl::StrJoin(names, ", ")), text),
+                        nearest.empty() ? "" : "; ", nearest);
   }
   const Reflection& reflection = *message->GetReflection();
   field.is_repeated() ? reflection.AddEnum(message, &field, value)
@@ -131,20 +148,8 @@ std::string SetText(absl::string_view text, const FieldDescriptor& field, Messag
 }  // namespace
 
 std::string Suggest(const std::string& name, const std::vector<std::string>& known) {
-  const std::string lower = absl::AsciiStrToLower(name);
-  std::size_t best = std::numeric_limits<std::size_t>::max();
-  const std::string* nearest = nullptr;
-  for (const std::string& candidate : known) {
-    const std::size_t distance = EditDistance(lower, absl::AsciiStrToLower(candidate));
-    if (distance < best) {
-      best = distance;
-      nearest = &candidate;
-    }
-  }
-  if (nearest != nullptr && best <= std::max<std::size_t>(2, nearest->size() / 3)) {
-    return absl::StrCat("did you mean '", *nearest, "'?");
-  }
-  return absl::StrCat("known: ", absl::StrJoin(known, ", "));
+  const std::string nearest = Question(name, known);
+  return nearest.empty() ? absl::StrCat("known: ", absl::StrJoin(known, ", ")) : nearest;
 }
 
 const FieldDescriptor* FindField(const std::string& name, const Descriptor& message) {
