@@ -17,10 +17,10 @@
 #include "deploy/launch/progress.h"
 #include "deploy/launch/result_tables.h"
 #include "deploy/launch/results.h"
-#include "deploy/launch/summary_reader.h"
 #include "deploy/terminal/terminal.h"
 #include "envs/registry/registry.h"
 #include "proto/config/experiment_file.h"
+#include "tests/deploy/launch/some_answers.h"
 #include "tests/support/temp_dir.h"
 
 namespace dbr {
@@ -70,51 +70,6 @@ TEST(TerminalTest, CutsBetweenCharacters) {
   EXPECT_EQ(Truncate("a–b", 2), "a–");
   EXPECT_EQ(Truncate("ab", 5), "ab");
   EXPECT_EQ(PadLeft("–", 3), "  –");
-}
-
-StatsReply SomeStats() {
-  StatsReply stats;
-  stats.set_total(100000);
-  stats.set_plus(60000);
-  stats.set_minus(41000);
-  stats.set_capacity(300000);
-  stats.set_bytes(80u << 20);
-  stats.set_inserted(123456);
-  stats.set_insert_rate(5120);
-  stats.set_samples_per_insert(3.97);
-  stats.set_episodes(12345);
-  stats.set_recent_score_mean(kNaN);
-  for (const double edge : {-1.0, 0.0, 1.0}) stats.add_advantage_edges(edge);
-  for (const int count : {40000, 60000}) stats.add_advantage_histogram(count);
-  WriterStats* writer = stats.add_writers();
-  writer->set_name("actor-0");
-  writer->set_inserted(123456);
-  writer->set_last_sequence(123456);
-  writer->set_held(100000);
-  BlockedClients* blocked = stats.add_blocked();
-  blocked->set_call("sample");
-  blocked->set_clients(1);
-  blocked->set_why("the rate limiter waits for inserts");
-  LatencyStats* latency = stats.add_latencies();
-  latency->set_call("sample");
-  latency->set_count(10);
-  latency->set_p50_us(250);
-  latency->set_p99_us(1200);
-  return stats;
-}
-
-LearnerStatus SomeStatus() {
-  LearnerStatus status;
-  status.set_updates(4000);
-  status.set_matrix_products("a library, bfloat16");
-  status.set_policy_version(82);
-  status.set_updates_per_second(410);
-  status.set_subscribers(2);
-  status.set_oldest_subscriber_version(80);
-  EvaluationReport* report = status.add_evaluations();
-  report->set_opponent("random");
-  report->set_score_mean(0.934);
-  return status;
 }
 
 Progress OfConnect4() {
@@ -190,17 +145,6 @@ TEST(ProgressTest, WritesALineNowAndThenWhereThereIsNoTerminal) {
   EXPECT_EQ(lines[3], "a word");
 }
 
-EvaluationResult Against(const std::string& opponent, double score) {
-  return {.env = "connect4",
-          .opponent = opponent,
-          .episodes = 1000,
-          .seed = 3,
-          .score_mean = score,
-          .score_stderr = 0.005,
-          .return_mean = 2 * score - 1,
-          .return_stderr = 0.01};
-}
-
 TEST(ResultsTest, TableHasThePaperBesideTheScores) {
   const std::string table = ResultTable({Against("random", 0.971), Against("one_ply", 0.5)});
   const std::vector<std::string> lines = absl::StrSplit(table, '\n');
@@ -252,132 +196,6 @@ TEST(ResultsTest, JsonHasItsStableNames) {
             R"({"env":"connect4","opponent":"mcts:10","episodes":1000,"seed":3,)"
             R"("score":{"mean":0.75,"stderr":0.005},"return":{"mean":0.5,"stderr":0.01}})");
   EXPECT_TRUE(ToJson(Against("", kNaN))["score"]["mean"].is_null());
-}
-
-TEST(ResultsTest, SummaryKeepsItsCountersOverAResume) {
-  TempDir folder;
-  const RunFolder run{folder.path()};
-  RunSummary summary;
-  RunSample sample;
-  sample.replay = SomeStats();
-  sample.learner = SomeStatus();
-  sample.reports = {sample.learner->evaluations(0)};
-  summary.Update(sample);
-  summary.missed_evaluations = 7;
-  summary.ended = RunEnding::kInterrupted;
-  summary.config = "bad \xff byte";
-  summary.commit = "abc+changes";
-  summary.training_s = 12.5;
-  summary.launches = 2;
-  summary.final_results = {Against("random", 0.9)};
-  ASSERT_TRUE(WriteSummary(summary, run).ok());
-  const Json json = Json::parse(*ReadFile(run.summary()));
-  EXPECT_EQ(json["games"], 12345);
-  EXPECT_EQ(json["updates"], 4000);
-  EXPECT_EQ(json["evaluations"][0]["opponent"], "random");
-  EXPECT_EQ(json["final"][0]["score"]["mean"], 0.9);
-  const RunSummary read = ReadSummary(run);
-  EXPECT_EQ(read.training_s, 12.5);
-  EXPECT_EQ(read.launches, 2);
-  EXPECT_EQ(read.transitions, 123456);
-  EXPECT_EQ(read.missed_evaluations, 7);
-  EXPECT_EQ(read.ended, RunEnding::kInterrupted);
-  EXPECT_EQ(read.commit, "abc+changes");
-  EXPECT_EQ(json["matrix_products"], "a library, bfloat16");
-  EXPECT_EQ(read.matrix_products, "a library, bfloat16");
-  ASSERT_EQ(read.final_results.size(), 1);
-  EXPECT_EQ(ToJson(read.final_results[0]), ToJson(summary.final_results[0]));
-}
-
-TEST(ResultsTest, SummaryKeepsTheKernelsWhileALearnerDoesNotSayThemYet) {
-  RunSummary summary;
-  RunSample sample;
-  sample.learner = SomeStatus();
-  summary.Update(sample);
-  sample.learner->clear_matrix_products();
-  summary.Update(sample);
-  EXPECT_EQ(summary.matrix_products, "a library, bfloat16");
-}
-
-TEST(ResultsTest, SummaryNamesTheIterationsThatWereNotEvaluated) {
-  TempDir folder;
-  const RunFolder run{folder.path()};
-  RunSummary summary;
-  summary.every_updates = 1000;
-  summary.ended = RunEnding::kRunning;
-  RunSample sample;
-  sample.learner = SomeStatus();
-  sample.learner->set_updates(9500);
-  EvaluationReport report = sample.learner->evaluations(0);
-  report.set_iteration(5);
-  report.add_skipped_iterations(2);
-  report.add_skipped_iterations(4);
-  sample.reports = {report};
-  summary.Update(sample);
-  const auto written = [&] {
-    EXPECT_TRUE(WriteSummary(summary, run).ok());
-    return Json::parse(*ReadFile(run.summary()));
-  };
-  EXPECT_EQ(written()["skipped_iterations"], Json({2, 4}));
-  // Those that it had not come to; of the policy of the last one is the final evaluation.
-  summary.ended = RunEnding::kMaxUpdates;
-  const Json json = written();
-  EXPECT_EQ(json["skipped_iterations"], Json({2, 4, 6, 7, 8}));
-  EXPECT_EQ(json["evaluations"][0]["iteration"], 5);
-  EXPECT_EQ(*ReadSummary(run).curve.LastIteration(), 5);
-  EXPECT_EQ(ReadSummary(run).SkippedIterations(), summary.SkippedIterations());
-}
-
-TEST(ResultsTest, ADamagedSummaryCountsAsNone) {
-  TempDir folder;
-  const RunFolder run{folder.path()};
-  EXPECT_EQ(ReadSummary(run).launches, 0);
-  ASSERT_TRUE(WriteFileAtomically(run.summary(), "{\"launches\": 3, ").ok());
-  EXPECT_EQ(ReadSummary(run).launches, 0);
-  ASSERT_TRUE(WriteFileAtomically(run.summary(), "{\"launches\": \"three\"}").ok());
-  EXPECT_EQ(ReadSummary(run).launches, 0);
-}
-
-TEST(RunStateTest, TextsAreThoseOfTheSummary) {
-  for (const char* text : {"running", "interrupted", "failed", "max_seconds", "max_episodes", "max_steps",
-                           "max_updates", "stop_at_return"}) {
-    const auto ending = ParseRunEnding(text);
-    ASSERT_TRUE(ending.has_value()) << text;
-    EXPECT_EQ(TextOf(*ending), text);
-  }
-  EXPECT_EQ(TextOf(RunEnding::kNone), "");
-  EXPECT_FALSE(ParseRunEnding("max_minutes").has_value());
-}
-
-TEST(RunStateTest, AtALimitFinalResultsMakeARunDone) {
-  RunSummary summary;
-  EXPECT_EQ(StateOf(summary), RunState::kNotBegun);
-  summary.ended = RunEnding::kMaxSteps;
-  EXPECT_EQ(StateOf(summary), RunState::kInterrupted) << "in the final evaluation";
-  summary.final_results = {Against("random", 0.9)};
-  EXPECT_EQ(StateOf(summary), RunState::kDone);
-  summary.ended = RunEnding::kFailed;
-  EXPECT_EQ(StateOf(summary), RunState::kFailed);
-}
-
-TEST(ResultsTest, AnUnknownEndingIsDamageAndIsNamed) {
-  TempDir folder;
-  const RunFolder run{folder.path()};
-  ASSERT_TRUE(WriteFileAtomically(run.summary(), "{\"ended\": \"max_minutes\"}").ok());
-  const absl::Status status = LoadSummary(run).status();
-  EXPECT_TRUE(absl::IsDataLoss(status)) << status;
-  EXPECT_THAT(std::string(status.message()), HasSubstr("found \"max_minutes\""));
-}
-
-// What is wrong with it is printed, and printing goes as deep as the value.
-TEST(ResultsTest, ASummaryThatIsNestedDeepIsDamage) {
-  TempDir folder;
-  const RunFolder run{folder.path()};
-  const std::string deep = std::string(100000, '[') + std::string(100000, ']');
-  ASSERT_TRUE(WriteFileAtomically(run.summary(), "{\"ended\": " + deep + "}").ok());
-  const absl::Status status = LoadSummary(run).status();
-  EXPECT_TRUE(absl::IsDataLoss(status)) << status;
-  EXPECT_THAT(std::string(status.message()), HasSubstr("more than 64 deep"));
 }
 
 TEST(StatsReportTest, TextShowsEverything) {
