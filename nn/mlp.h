@@ -5,9 +5,9 @@
 
 #include "core/batch.h"
 #include "core/rng.h"
+#include "nn/mlp_parameters.h"
 #include "nn/mlp_pass.h"
 #include "nn/mlp_shape.h"
-#include "nn/rounded_weights.h"
 
 namespace dbr {
 

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "core/batch.h"
+#include "nn/mlp_parameters.h"
 #include "nn/mlp_shape.h"
 #include "nn/product/layer_products.h"
-#include "nn/rounded_weights.h"
 
 namespace dbr {
 

@@ -60,7 +60,8 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
     }
     // Self-imitation fits beta+ to B. Its forward pass at s is counted below.
     if (batch.plus == 0) flops += shape.ParameterGradientFlops(batch.uniform);
-    // At s: pi, beta+ and beta-. At s': the target pi', and beta+ too where the value is penalised.
+    // At s: pi, beta+ and beta-, whether the constraint looks at beta- or not, so that what is left out shows
+    // as time. At s': the target pi', and beta+ too where the value is penalised.
     const int forward = config().value_penalty() && constrained ? 5 : 4;
     return flops + forward * shape.ForwardFlops(batch.uniform) + shape.ParameterGradientFlops(batch.uniform);
   }

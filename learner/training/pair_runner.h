@@ -26,10 +26,10 @@ inline int UpdateThreads(const AlgorithmConfig& config) {
 // number of threads. One caller at a time. Run allocates nothing.
 //
 // An update hands over some eight times, for parts of 50 microseconds and more. A thread that sleeps takes
-// about as long to wake, so that both threads first look for kLooks times whether the other has come.
+// about as long to wake, so that both threads first look `looks` times whether the other has come.
 class PairRunner {
  public:
-  explicit PairRunner(int threads) {
+  explicit PairRunner(int threads, int looks = kLooks) : looks_(looks) {
     if (threads > 1) thread_ = std::thread([this] { Work(); });
   }
   ~PairRunner() {
@@ -71,7 +71,7 @@ class PairRunner {
       const int now = turn_.load(std::memory_order_acquire);
       return now == turn || now == kClosed;
     };
-    for (int look = 0; look < kLooks; ++look) {
+    for (int look = 0; look < looks_; ++look) {
       if (has_come()) return;
 #if defined(__x86_64__)
       _mm_pause();
@@ -91,6 +91,7 @@ class PairRunner {
     }
   }
 
+  const int looks_;
   absl::Mutex mutex_;  // held where the turn changes, so that no wake-up is missed
   std::atomic<int> turn_{kCaller};
   void (*call_)(const void*) = nullptr;  // written by the caller before kSecond
