@@ -14,7 +14,7 @@ template <class Element>
 inline constexpr bool kRounds = !std::is_same_v<Element, SumOf<Element>>;
 
 // Gives `matrix` PaddedRows(rows) rows and n columns or more: the number of samples with a gradient changes
-// from batch to batch. The rows that are added are 0, and stay so: nothing writes them.
+// from batch to batch. The rows that are added are 0, and stay so: products write 0 there.
 template <class Element>
 void ResizePadded(Eigen::Index rows, Eigen::Index n, MatrixX<Element>* matrix) {
   const Eigen::Index padded = PaddedRows<Element>(rows);
@@ -98,12 +98,12 @@ void MlpPass<Element>::ResizeDeltas(Eigen::Index n) {
 
 template <class Element>
 LayerParameters<Element> MlpPass<Element>::Layer(const Parameters& parameters, int layer) const {
-  const Sum* const bias = parameters.values + shape_.bias_offset(layer);
   if constexpr (kRounds<Element>) {
     const MatrixX<Bfloat16>& weight = parameters.rounded->weight(layer);
-    return {weight.data(), weight.rows(), bias};
+    return {weight.data(), weight.rows(), parameters.rounded->bias(layer).data()};
   } else {
-    return {parameters.values + shape_.weight_offset(layer), shape_.out(layer), bias};
+    return {parameters.values + shape_.weight_offset(layer), shape_.out(layer),
+            parameters.values + shape_.bias_offset(layer)};
   }
 }
 
@@ -143,7 +143,7 @@ const MatrixX<SumOf<Element>>& MlpPass<Element>::Forward(const MlpShape& shape, 
     Columns<const Element> from = input.Middle(first, n);
     for (int layer = 0; layer < last; ++layer) {
       const Columns<Element> to = ColumnsOf(&hidden_[layer], first, n);
-      products_[layer]->Hidden(Layer(parameters, layer), from, {to.values, shape.out(layer), n, to.stride});
+      products_[layer]->Hidden(Layer(parameters, layer), from, to);
       from = to;
     }
     products_[last]->Output(Layer(parameters, last), from, ColumnsOf(&output_, first, n));
@@ -170,8 +170,7 @@ void MlpPass<Element>::ParameterGradient(const Parameters& parameters, const Con
     products_[layer]->WeightGradient(delta, input, gradient->data() + shape_.weight_offset(layer));
     if (layer == 0) break;
     const Columns<Element> previous = ColumnsOf(&deltas_[layer - 1], 0, n);
-    products_[layer]->HiddenGradient(Layer(parameters, layer), delta,
-                                     {previous.values, shape_.in(layer), n, previous.stride});
+    products_[layer]->HiddenGradient(Layer(parameters, layer), delta, previous);
     for (Eigen::Index j = 0; j < n; ++j) {
       MaskColumn(input.values + j * input.stride, previous.values + j * previous.stride, shape_.in(layer),
                  gradient->data() + shape_.bias_offset(layer - 1));
@@ -200,8 +199,7 @@ void MlpPass<Element>::Backpropagate(const Parameters& parameters, Columns<const
                                      Eigen::Index first, Columns<Sum> dx) {
   for (int layer = shape_.layer_count() - 1; layer > 0; --layer) {
     const Columns<Element> previous = ColumnsOf(&deltas_[layer - 1], first, delta.cols);
-    products_[layer]->HiddenGradient(Layer(parameters, layer), delta,
-                                     {previous.values, shape_.in(layer), delta.cols, previous.stride});
+    products_[layer]->HiddenGradient(Layer(parameters, layer), delta, previous);
     const MatrixX<Element>& output = hidden_[layer - 1];
     for (Eigen::Index j = 0; j < active_.count; ++j) {
       MaskColumn(output.col(first + active_.columns[j]).data(), previous.values + j * previous.stride,

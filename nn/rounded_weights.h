@@ -10,8 +10,8 @@
 namespace dbr {
 
 // A rounded copy of the weights of a flat parameter vector, whose owner refreshes it when they change. The
-// biases are not in it: products take them in float32. Each weight is padded with rows and columns of zeros
-// (PaddedRows). It can be copied.
+// biases are copied without rounding: products take them in float32. Each weight is padded with rows and
+// columns of zeros, and each bias with zeros (PaddedRows). It can be copied.
 class RoundedWeights {
  public:
   RoundedWeights() = default;  // of no network
@@ -22,14 +22,19 @@ class RoundedWeights {
   // Rounds columns first ... first + n of a layer's weight from `column` on, [out x n], where they lie in the
   // parameters side by side.
   void Round(int layer, Eigen::Index first, Eigen::Index n, const float* column);
-  // Rounds all weights of `parameters` [parameter_count].
+  // Takes over a layer's bias [out].
+  void CopyBias(int layer, const float* bias);
+  // Rounds all weights of `parameters` [parameter_count] and takes over the biases.
   void RoundAll(const MlpShape& shape, const float* parameters);
 
   // [PaddedRows(out) x PaddedRows(in)], column-major.
   const MatrixX<Bfloat16>& weight(int layer) const { return weights_[layer]; }
+  // [PaddedRows(out)].
+  const VectorX<float>& bias(int layer) const { return biases_[layer]; }
 
  private:
   std::vector<MatrixX<Bfloat16>> weights_;
+  std::vector<VectorX<float>> biases_;
   std::vector<Eigen::Index> outputs_;  // of each layer, without padding
 };
 

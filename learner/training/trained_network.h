@@ -106,6 +106,11 @@ class TrainedNetwork {
         }
       }
       StepPart(shape_.bias_offset(layer), rows);
+      if constexpr (std::is_same_v<Scalar, float>) {
+        const Eigen::Index bias = shape_.bias_offset(layer);
+        if (!rounded_.empty()) rounded_.CopyBias(layer, parameters_.data() + bias);
+        if (!rounded_target_.empty()) rounded_target_.CopyBias(layer, target_.data() + bias);
+      }
     }
   }
   void set_learning_rate(double learning_rate) { adam_.set_learning_rate(learning_rate); }

@@ -25,7 +25,8 @@ struct Columns {
   operator Columns<const Element>() const { return {values, rows, cols, stride}; }
 };
 
-// The parameters of a layer: its weight [out x in], column-major, and its bias [out].
+// The parameters of a layer: its weight [out x in], column-major, and its bias [out], both padded as the
+// layer's inputs and outputs are.
 template <class Element>
 struct LayerParameters {
   const Element* weight;
@@ -40,11 +41,11 @@ struct LayerSize {
 };
 
 // The products of one layer, y = W x + b and its gradients, for samples in columns. Results overwrite what
-// stood there. x and delta may have more rows than the layer has inputs or outputs: rows that are added
-// (PaddedRows) are 0, and the weight has columns, or rows, for them that are 0 too; products over them may
-// read them. Everything that a library needs for a shape is made when the shape comes for the first time and
-// kept: afterwards nothing is made or allocated. One thread at a time; no threads inside. The same arguments
-// give the same bits.
+// stood there. All matrices of Elements may have more rows than the layer has inputs or outputs (PaddedRows):
+// those of x and delta are 0, those of y and dx become 0. The weight has columns, or rows, for them that are
+// 0 too, and the bias entries. Everything that a library needs for a shape is made when the shape comes for
+// the first time and kept: afterwards nothing is made or allocated. One thread at a time; no threads inside.
+// The same arguments give the same bits.
 template <class Element>
 class LayerProducts {
  public:

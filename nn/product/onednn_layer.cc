@@ -152,9 +152,9 @@ class OneDnnLayer final : public LayerProducts<Element> {
   template <class Result>
   void Forward(const LayerParameters<Element>& layer, const Columns<const Element>& x,
                const Columns<Result>& y, bool relu) {
-    const Matrix b{x.rows, size_.out, {layer.stride, 1}, TypeOf<Element>()};
-    Run({Samples(x, x.rows), b, Samples(y, size_.out), /*bias=*/true, relu}, x.values, layer.weight,
-        layer.bias, y.values);
+    const Matrix b{x.rows, y.rows, {layer.stride, 1}, TypeOf<Element>()};
+    Run({Samples(x, x.rows), b, Samples(y, y.rows), /*bias=*/true, relu}, x.values, layer.weight, layer.bias,
+        y.values);
   }
   template <class Result>
   void Backward(const LayerParameters<Element>& layer, const Columns<const Element>& delta,
