@@ -19,6 +19,7 @@ struct PolicySpec {
   int observation_size = 0;  // floats
   ActionSpace actions;
   std::vector<int> hidden_sizes;
+  bool critic_layer_norm = false;  // whether the critics normalise their hidden layers
 
   bool operator==(const PolicySpec&) const = default;
 };
@@ -26,6 +27,7 @@ struct PolicySpec {
 // Names of the networks in a snapshot. A snapshot always holds kPolicyNetwork; an algorithm adds those that
 // it has.
 inline constexpr char kPolicyNetwork[] = "policy";
+inline constexpr char kPolicyAverage[] = "policy_average";  // the Polyak average of "policy"
 inline constexpr char kCritic1[] = "critic_1";
 inline constexpr char kCritic2[] = "critic_2";
 inline constexpr char kBetaPlus[] = "beta_plus";
