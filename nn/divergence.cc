@@ -8,9 +8,26 @@
 namespace dbr {
 namespace {
 
-// The root of a squared MMD; rounding may leave its sum of means below 0.
+// A squared MMD: rounding may leave its sum of means below 0. A NaN stays one.
+double KeepAbove0(double squared) {
+  return std::max(squared, 0.0);
+}
+
+// The root of a squared MMD.
 double MmdOf(double squared) {
-  return std::sqrt(std::max(squared, 0.0) + kMmdFloor);
+  return std::sqrt(KeepAbove0(squared) + kMmdFloor);
+}
+
+// Turns squared MMDs [n] into MMDs.
+template <class Scalar>
+void TakeRoot(VectorX<Scalar>* values) {
+  for (Scalar& value : *values) value = static_cast<Scalar>(MmdOf(value));
+}
+
+// Turns the gradient of squared MMDs [rows x n] into that of `mmd` [n], their roots.
+template <class Scalar>
+void ScaleByRoot(const VectorX<Scalar>& mmd, MatrixX<Scalar>* gradient) {
+  for (Eigen::Index j = 0; j < mmd.size(); ++j) gradient->col(j) *= 1 / (2 * mmd[j]);
 }
 
 template <class Scalar>
@@ -130,17 +147,16 @@ void SampledMmd(const SampleSets<Scalar>& samples, const Kernel& kernel, VectorX
 }
 
 template <class Scalar>
-void ExactMmd(const GaussianView<Scalar>& p, const GaussianView<Scalar>& q, double sigma,
-              VectorX<Scalar>* mmd, GaussianGradient<Scalar>* d_p) {
+void SquaredMmd(const GaussianView<Scalar>& p, const GaussianView<Scalar>& q, double sigma,
+                VectorX<Scalar>* squared, GaussianGradient<Scalar>* d_p) {
   CheckSameShape(p, q);
   const Eigen::Index dimensions = p.mean.rows(), n = p.mean.cols();
-  mmd->resize(n);
+  squared->resize(n);
   if (d_p != nullptr) d_p->Resize(dimensions, n);
   for (Eigen::Index j = 0; j < n; ++j) {
     const double pp = ExpectedKernel(p, p, sigma, j), qq = ExpectedKernel(q, q, sigma, j);
     const double pq = ExpectedKernel(p, q, sigma, j);
-    const double value = MmdOf(pp + qq - 2 * pq);
-    (*mmd)[j] = static_cast<Scalar>(value);
+    (*squared)[j] = static_cast<Scalar>(KeepAbove0(pp + qq - 2 * pq));
     for (Eigen::Index d = 0; d_p != nullptr && d < dimensions; ++d) {
       const double difference = p.mean(d, j) - q.mean(d, j);
       const double variance = std::exp(2.0 * p.log_std(d, j));
@@ -149,24 +165,38 @@ void ExactMmd(const GaussianView<Scalar>& p, const GaussianView<Scalar>& q, doub
       const double by_mean = -difference / t;
       const double by_log_std = variance * (difference * difference / t - 1) / t;
       const double own_by_log_std = -2 * variance / (sigma + 2 * variance);
-      d_p->mean(d, j) = static_cast<Scalar>(-pq * by_mean / value);
-      d_p->log_std(d, j) = static_cast<Scalar>((pp * own_by_log_std / 2 - pq * by_log_std) / value);
+      d_p->mean(d, j) = static_cast<Scalar>(-2 * pq * by_mean);
+      d_p->log_std(d, j) = static_cast<Scalar>(pp * own_by_log_std - 2 * pq * by_log_std);
     }
   }
 }
 
 template <class Scalar>
+void ExactMmd(const GaussianView<Scalar>& p, const GaussianView<Scalar>& q, double sigma,
+              VectorX<Scalar>* mmd, GaussianGradient<Scalar>* d_p) {
+  SquaredMmd<Scalar>(p, q, sigma, mmd, d_p);
+  TakeRoot(mmd);
+  if (d_p == nullptr) return;
+  ScaleByRoot(*mmd, &d_p->mean);
+  ScaleByRoot(*mmd, &d_p->log_std);
+}
+
+template <class Scalar>
+void SquaredCategoricalMmd(const ConstMatrixRef<Scalar>& p, const ConstMatrixRef<Scalar>& q, double sigma,
+                           VectorX<Scalar>* squared, MatrixX<Scalar>* d_p) {
+  CheckSameShape<Scalar>(p, q);
+  const auto weight = static_cast<Scalar>(-std::expm1(-1 / sigma));  // 1 - kappa
+  squared->resize(p.cols());
+  for (Eigen::Index j = 0; j < p.cols(); ++j) (*squared)[j] = weight * (p.col(j) - q.col(j)).squaredNorm();
+  if (d_p != nullptr) *d_p = 2 * weight * (p - q);
+}
+
+template <class Scalar>
 void CategoricalMmd(const ConstMatrixRef<Scalar>& p, const ConstMatrixRef<Scalar>& q, double sigma,
                     VectorX<Scalar>* mmd, MatrixX<Scalar>* d_p) {
-  CheckSameShape<Scalar>(p, q);
-  const double weight = -std::expm1(-1 / sigma);  // 1 - kappa
-  mmd->resize(p.cols());
-  if (d_p != nullptr) d_p->resize(p.rows(), p.cols());
-  for (Eigen::Index j = 0; j < p.cols(); ++j) {
-    const double value = MmdOf(weight * static_cast<double>((p.col(j) - q.col(j)).squaredNorm()));
-    (*mmd)[j] = static_cast<Scalar>(value);
-    if (d_p != nullptr) d_p->col(j).noalias() = static_cast<Scalar>(weight / value) * (p.col(j) - q.col(j));
-  }
+  SquaredCategoricalMmd<Scalar>(p, q, sigma, mmd, d_p);
+  TakeRoot(mmd);
+  if (d_p != nullptr) ScaleByRoot(*mmd, d_p);
 }
 
 template <class Scalar>
@@ -233,6 +263,10 @@ void SampledKl(const GaussianView<Scalar>& p, const GaussianView<Scalar>& q,
                                    MatrixX<Scalar>*);                                                        \
   template void ExactMmd<Scalar>(const GaussianView<Scalar>&, const GaussianView<Scalar>&, double,           \
                                  VectorX<Scalar>*, GaussianGradient<Scalar>*);                               \
+  template void SquaredMmd<Scalar>(const GaussianView<Scalar>&, const GaussianView<Scalar>&, double,         \
+                                   VectorX<Scalar>*, GaussianGradient<Scalar>*);                             \
+  template void SquaredCategoricalMmd<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&,  \
+                                              double, VectorX<Scalar>*, MatrixX<Scalar>*);                   \
   template void CategoricalMmd<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&, double, \
                                        VectorX<Scalar>*, MatrixX<Scalar>*);                                  \
   template void GaussianKl<Scalar>(const GaussianView<Scalar>&, const GaussianView<Scalar>&,                 \

@@ -43,12 +43,23 @@ template <class Scalar>
 void ExactMmd(const GaussianView<Scalar>& p, const GaussianView<Scalar>& q, double sigma,
               VectorX<Scalar>* mmd, GaussianGradient<Scalar>* d_p);
 
+// The square of ExactMmd, without the floor. Its gradient goes to 0 where p becomes q; that of the root keeps
+// its length there.
+template <class Scalar>
+void SquaredMmd(const GaussianView<Scalar>& p, const GaussianView<Scalar>& q, double sigma,
+                VectorX<Scalar>* squared, GaussianGradient<Scalar>* d_p);
+
 // The exact MMD of categoricals [choices x n] under the Gaussian kernel on one-hot choices, which is 1
 // between equal and kappa = exp(-1 / sigma) between different ones: its square is (1 - kappa) |p - q|^2. The
 // gradient for q is -d_p.
 template <class Scalar>
 void CategoricalMmd(const ConstMatrixRef<Scalar>& p, const ConstMatrixRef<Scalar>& q, double sigma,
                     VectorX<Scalar>* mmd, MatrixX<Scalar>* d_p);
+
+// The square of CategoricalMmd, without the floor.
+template <class Scalar>
+void SquaredCategoricalMmd(const ConstMatrixRef<Scalar>& p, const ConstMatrixRef<Scalar>& q, double sigma,
+                           VectorX<Scalar>* squared, MatrixX<Scalar>* d_p);
 
 // KL(p || q), in nats, summed over dimensions. The same before and after a tanh.
 template <class Scalar>

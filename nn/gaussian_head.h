@@ -24,8 +24,8 @@ class GaussianHead {
     const auto min = static_cast<Scalar>(limits.min), max = static_cast<Scalar>(limits.max);
     mean_ = output.topRows(dimensions);
     log_std_ = output.bottomRows(dimensions).cwiseMax(min).cwiseMin(max);
-    within_ = (output.bottomRows(dimensions).array() >= min && output.bottomRows(dimensions).array() <= max)
-                  .template cast<Scalar>();
+    outside_ = (output.bottomRows(dimensions).array() > max).template cast<Scalar>() -
+               (output.bottomRows(dimensions).array() < min).template cast<Scalar>();
   }
 
   GaussianView<Scalar> view() const { return {mean_, log_std_}; }
@@ -33,17 +33,20 @@ class GaussianHead {
   const MatrixX<Scalar>& log_std() const { return log_std_; }
 
   // Turns a gradient with respect to the Gaussians into one with respect to the network's output
-  // [2 * dimensions x n], which is 0 for a log-std that was clipped.
+  // [2 * dimensions x n]. A log-std that was clipped passes a gradient on only where a step against it leads
+  // back towards the limits. Without that, a log-std that has left them could never come back.
   void Join(const GaussianGradient<Scalar>& gradient, MatrixX<Scalar>* d_output) const {
     d_output->resize(2 * mean_.rows(), mean_.cols());
     d_output->topRows(mean_.rows()) = gradient.mean;
-    d_output->bottomRows(mean_.rows()) = gradient.log_std.cwiseProduct(within_);
+    // A product that is a NaN is not below 0, so that a NaN goes on.
+    d_output->bottomRows(mean_.rows()) = gradient.log_std.binaryExpr(
+        outside_, [](Scalar d, Scalar outside) { return d * outside < Scalar{0} ? Scalar{0} : d; });
   }
 
  private:
   MatrixX<Scalar> mean_;     // [dimensions x n]
   MatrixX<Scalar> log_std_;  // [dimensions x n]
-  MatrixX<Scalar> within_;   // [dimensions x n] 1 where the log-std was not clipped, else 0
+  MatrixX<Scalar> outside_;  // [dimensions x n] 1 above the limits of the log-std, -1 below, else 0
 };
 
 }  // namespace dbr

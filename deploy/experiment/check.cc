@@ -18,6 +18,7 @@
 #include "deploy/launch/run_limits.h"
 #include "deploy/launch/run_plan.h"
 #include "proto/config/config_check.h"
+#include "proto/config/config_combinations.h"
 #include "proto/config/config_fields.h"
 #include "proto/config/config_file.h"
 
@@ -188,6 +189,9 @@ void FindPairErrors(const Experiment& experiment, const std::vector<Cell>& cells
     const auto note = [&](absl::string_view what) {
       errors->push_back(absl::StrCat("task '", cell.task, "', contender '", cell.contender, "': ", what));
     };
+    std::vector<std::string> contradictions;
+    FindContradictions(cell.config, &contradictions);
+    for (const std::string& contradiction : contradictions) note(contradiction);
     const absl::StatusOr<EnvSpec>& env = specs.Of(cell.config);
     const absl::Status fits = env.ok() ? CheckFits(cell.config, *env) : env.status();
     if (!fits.ok()) note(fits.message());

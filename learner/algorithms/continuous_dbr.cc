@@ -20,10 +20,11 @@ absl::Status ContinuousDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, co
   EvaluateBehaviors(uniform);
   const Scalar critic_loss = regression_.Fit(uniform, networks_.spec.config.reward_scale(), next_value_,
                                              &networks_.critics, RewardBonus(uniform));
-  const PolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
+  ImprovePolicy(uniform);
   JudgeAndImitate(uniform);
-  networks_.Finish(policy_loss);
-  return networks_.Report({critic_loss, beta_plus_.loss(), beta_minus_.loss()}, policy_loss,
+  networks_.Finish(policy_loss_,
+                   static_cast<Scalar>(config().target_entropy() * networks_.spec.actions.size));
+  return networks_.Report({critic_loss, beta_plus_.loss(), beta_minus_.loss()}, policy_loss_,
                           regression_.target().mean(), &metrics_);
 }
 
@@ -46,13 +47,17 @@ template <class Scalar>
 void ContinuousDbr<Scalar>::ComputeNextValue(const BasicBatch<Scalar>& batch) {
   const Eigen::Index n = batch.size();
   FillNormal(networks_.rng, networks_.spec.actions.size, config().target_samples() * n, &next_noise_);
-  next_value_ = next_.Compute(batch.next_observations, next_noise_,
-                              static_cast<Scalar>(config().target_min_weight()), &networks_.critics);
+  const auto temperature = networks_.soft ? std::optional<Scalar>(networks_.tau()) : std::nullopt;
+  next_value_ =
+      next_.Compute(batch.next_observations, next_noise_, static_cast<Scalar>(config().target_min_weight()),
+                    &networks_.critics, temperature);
   if (config().value_penalty() && networks_.constrained) {
     DrawDivergenceNoise(n);
     penalty_.Compute({options_.divergence, options_.mmd_sigma}, next_.pi(),
                      beta_plus_.At(batch.next_observations, &networks_.beta_plus), {noise_.pi, noise_.plus});
-    next_value_ -= networks_.alpha() * penalty_.value();
+    // alpha is in units of the policy's Q term.
+    const Scalar unit = options_.normalize_q ? next_value_.cwiseAbs().mean() : Scalar{1};
+    next_value_ -= networks_.alpha() * unit * penalty_.value();
   }
 }
 
@@ -84,18 +89,22 @@ void ContinuousDbr<Scalar>::DrawDivergenceNoise(Eigen::Index n) {
 }
 
 template <class Scalar>
-PolicyLoss<Scalar> ContinuousDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
+void ContinuousDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
   const Eigen::Index n = batch.size();
   FillNormal(networks_.rng, networks_.spec.actions.size, config().policy_samples() * n, &noise_.actions);
-  DrawDivergenceNoise(n);
-  options_.use_q = networks_.updates >= config().warm_start_updates();
-  const PolicyLoss<Scalar> loss =
-      objective_.Compute(options_, {pi_, beta_plus_.head(), beta_minus_.head()}, batch.observations, noise_,
-                         networks_.alpha(), &networks_.critics, &d_output_);
-  networks_.policy.Step(batch.observations, d_output_);
+  if (networks_.improves_policy()) {
+    DrawDivergenceNoise(n);
+    options_.use_q = networks_.uses_q();
+    options_.entropy_weight = networks_.EntropyWeight();
+    policy_loss_ =
+        objective_.Compute(options_, {pi_, beta_plus_.head(), beta_minus_.head()}, batch.observations, noise_,
+                           networks_.alpha(), &networks_.critics, &d_output_);
+    networks_.policy.Step(batch.observations, d_output_);
+  } else {
+    objective_.Evaluate({pi_, batch.observations, noise_.actions}, &networks_.critics);
+  }
   value_.resize(n);
   objective_.StateValue(networks_.critics, &value_);
-  return loss;
 }
 
 template <class Scalar>
@@ -106,6 +115,9 @@ void ContinuousDbr<Scalar>::JudgeAndImitate(const BasicBatch<Scalar>& batch) {
     if (imitation_.imitates()) beta_plus_.Fit(batch, &imitation_.weights(), &networks_.beta_plus);
   } else {
     networks_.SetAdvantages(regression_.behavior_value() - value_);
+  }
+  if (config().behavior_data() == DbrConfig::BATCH) {
+    networks_.FitBehaviorsTo(batch, &beta_plus_, &beta_minus_);
   }
 }
 

@@ -19,12 +19,17 @@ namespace dbr {
 // update, with B drawn from D, B+ from D+ and B- from D-:
 //   1. beta+ maximises the mean of log beta+(a|s) over B+, and beta- does the same over B- (the definitions
 //      above the paper's equation 3). An empty part skips its step.
-//   2. y = r + discount * V'(s'), where V' is the greatest value of w min_i Q'_i + (1 - w) max_i Q'_i over
-//      target_samples draws from pi', w = target_min_weight. With value_penalty, alpha * D(pi'(.|s'),
-//      beta+(.|s')) is subtracted from V' (the paper's equation 3). Each critic regresses on y.
-//   3. pi minimises -E[min_i mean_k Q_i(s, a_k)] + alpha * (D(pi, beta+) - c), the dynamic constraint of the
-//      paper's section "From ARM and BEAR to DBR" (learner/objectives/dual_behavior_objective.h).
-//   4. alpha ascends on alpha * (D(pi, beta+) - c).
+//   2. y = r + discount * V'(s'), where V' is the greatest value of w min_i Q'_i + (1 - w) max_i Q'_i - tau
+//      log pi'(a'|s') over target_samples draws a' from pi', w = target_min_weight. With value_penalty, alpha
+//      * D(pi'(.|s'), beta+(.|s')) is subtracted from V' (the paper's equation 3), times the mean of |V'|
+//      where normalize_q divides Q by its mean size. Each critic regresses on y.
+//   3. pi minimises -(E[min_i mean_k Q_i(s, a_k)] + tau H(pi)) + alpha * (D(pi, beta+) - c), the dynamic
+//      constraint of the paper's section "From ARM and BEAR to DBR"
+//      (learner/objectives/dual_behavior_objective.h).
+//   4. alpha ascends on alpha * (D(pi, beta+) - c). The temperature tau rises while the entropy H(pi) is
+//   below
+//      target_entropy for each dimension and falls while it is above (Haarnoja et al. 2018, equation 18).
+//      Without first_temperature tau is 0 in step 2 and entropy_weight in step 3.
 //   5. Polyak averaging of the critics and of pi.
 //   6. A = Q(s, a) - V(s) for every transition of B. Q is the smaller twin, and V is the mean of the smaller
 //      twin over the draws of step 3.
@@ -35,7 +40,11 @@ namespace dbr {
 // The step is skipped where all w are 0. The critics take no part in it.
 // munchausen_weight w: the reward of step 2 becomes r + w * log beta+(a|s), with the log clipped to [-1, 0],
 // before it is scaled (the paper's section on ablations). beta+ is the one that step 1 left.
-// Constraint NONE: step 3 has no second term, and there is no step 4.
+// Constraint NONE: step 3 has no second term, and step 4 moves tau alone.
+// behavior_data BATCH: in place of step 1, beta+ and beta- are fitted after step 6 to the transitions of B
+// with A >= 0 and with A <= 0.
+// updates_per_policy_update k: steps 3 and 4 are made in every k-th update. V(s) of step 6 is then the mean
+// over draws of the same number.
 //
 // Departure from the paper: step 6 takes Q(s, a) from before step 2's gradient step, so that nothing is
 // computed twice.
@@ -64,8 +73,9 @@ class ContinuousDbr : public ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>> 
   void EvaluateBehaviors(const BasicBatch<Scalar>& batch);
   // Returns the bonus that is added to the rewards [n], or null for none. EvaluateBehaviors comes first.
   const VectorX<Scalar>* RewardBonus(const BasicBatch<Scalar>& batch);
-  PolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
-  // Sets the advantages and makes self-imitation's fit. ImprovePolicy comes first.
+  // Makes a step of pi, where this update improves it, and sets value_.
+  void ImprovePolicy(const BasicBatch<Scalar>& batch);
+  // Sets the advantages and makes the fits that need them. ImprovePolicy comes first.
   void JudgeAndImitate(const BasicBatch<Scalar>& batch);
   void DrawDivergenceNoise(Eigen::Index n);
 
@@ -82,6 +92,7 @@ class ContinuousDbr : public ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>> 
   VectorX<Scalar> next_value_, value_, log_prob_, bonus_;  // [n]
   GaussianGradient<Scalar> unused_gradient_;               // the workspace of a likelihood
   SelfImitation<Scalar> imitation_;
+  PolicyLoss<Scalar> policy_loss_;  // of the newest update that improved the policy
 };
 
 std::unique_ptr<Algorithm> MakeContinuousDbr(const AlgorithmSpec& spec);

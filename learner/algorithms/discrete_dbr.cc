@@ -22,10 +22,11 @@ absl::Status DiscreteDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, cons
       networks_.critics.Fit(uniform.observations, [&](const MatrixX<Scalar>& q, MatrixX<Scalar>* d_q) {
         return CriticLoss<Scalar>(q, uniform.actions, target_, d_q);
       });
-  const PolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
+  ImprovePolicy(uniform);
   JudgeAndImitate(uniform);
-  networks_.Finish(policy_loss);
-  return networks_.Report({critic_loss, beta_plus_.loss(), beta_minus_.loss()}, policy_loss, target_.mean(),
+  networks_.Finish(policy_loss_, static_cast<Scalar>(config().target_entropy_ratio()) *
+                                     MeanGreatestEntropy<Scalar>(uniform.masks));
+  return networks_.Report({critic_loss, beta_plus_.loss(), beta_minus_.loss()}, policy_loss_, target_.mean(),
                           &metrics_);
 }
 
@@ -45,11 +46,17 @@ void DiscreteDbr<Scalar>::ComputeTargets(const BasicBatch<Scalar>& batch) {
   networks_.critics.EvaluateTargets(batch.next_observations);
   ExpectedTargetValue<Scalar>(next_pi_, networks_.critics.target1(), networks_.critics.target2(), min_weight,
                               &target_);
+  if (networks_.soft) {
+    Entropy(next_pi_, &next_entropy_);
+    target_ += networks_.tau() * next_entropy_;
+  }
   if (config().value_penalty() && networks_.constrained) {
     Divergence<Scalar>(options_.divergence, static_cast<Scalar>(options_.mmd_sigma), next_pi_,
                        beta_plus_.At(batch.next_observations, batch.next_masks, &networks_.beta_plus),
                        &penalty_, nullptr);
-    target_ -= networks_.alpha() * penalty_;
+    // alpha is in units of the policy's Q term.
+    const Scalar unit = options_.normalize_q ? target_.cwiseAbs().mean() : Scalar{1};
+    target_ -= networks_.alpha() * unit * penalty_;
   }
   CriticTarget(batch, networks_.spec.config.reward_scale(), target_, &target_);
 }
@@ -77,14 +84,15 @@ void DiscreteDbr<Scalar>::RaiseRewards(const BasicBatch<Scalar>& batch) {
 }
 
 template <class Scalar>
-PolicyLoss<Scalar> DiscreteDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
+void DiscreteDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
   MaskedSoftmax<Scalar>(networks_.policy.Forward(batch.observations), batch.masks, &pi_);
-  options_.use_q = networks_.updates >= config().warm_start_updates();
-  const PolicyLoss<Scalar> loss = DualBehaviorPolicyLoss<Scalar>(
-      options_, pi_, networks_.critics.q1(), networks_.critics.q2(), beta_plus_.distribution(),
-      beta_minus_.distribution(), networks_.alpha(), &workspace_, &d_logits_);
+  if (!networks_.improves_policy()) return;
+  options_.use_q = networks_.uses_q();
+  options_.entropy_weight = networks_.EntropyWeight();
+  policy_loss_ = DualBehaviorPolicyLoss<Scalar>(options_, pi_, networks_.critics.q1(), networks_.critics.q2(),
+                                                beta_plus_.distribution(), beta_minus_.distribution(),
+                                                networks_.alpha(), &workspace_, &d_logits_);
   networks_.policy.Step(batch.observations, d_logits_);
-  return loss;
 }
 
 template <class Scalar>
@@ -93,11 +101,14 @@ void DiscreteDbr<Scalar>::JudgeAndImitate(const BasicBatch<Scalar>& batch) {
   ExpectedTargetValue<Scalar>(pi_, q1, q2, /*min_weight=*/1, &value_);
   if (!ImitatesItself(config())) {
     ComputeAdvantages<Scalar>(q1, q2, batch.actions, value_, &networks_.advantages);
-    return;
+  } else {
+    imitation_.Judge(batch, networks_.spec.config.reward_scale(), value_);
+    if (imitation_.imitates()) beta_plus_.Fit(batch, &imitation_.weights(), &networks_.beta_plus);
+    networks_.SetAdvantages(imitation_.advantage());
   }
-  imitation_.Judge(batch, networks_.spec.config.reward_scale(), value_);
-  if (imitation_.imitates()) beta_plus_.Fit(batch, &imitation_.weights(), &networks_.beta_plus);
-  networks_.SetAdvantages(imitation_.advantage());
+  if (config().behavior_data() == DbrConfig::BATCH) {
+    networks_.FitBehaviorsTo(batch, &beta_plus_, &beta_minus_);
+  }
 }
 
 template <class Scalar>

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "learner/objectives/batch_partition.h"
 #include "learner/objectives/dual_behavior.h"
 #include "learner/training/actor_critic.h"
 #include "learner/training/multiplier.h"
@@ -28,8 +29,13 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
       : ActorCritic<Scalar>(spec, /*policy_target=*/true),
         beta_plus(this->policy.shape(), this->Options(spec, /*with_target=*/false), this->rng),
         beta_minus(this->policy.shape(), this->Options(spec, /*with_target=*/false), this->rng),
-        multiplier(spec.config.dbr().first_multiplier(), spec.config.dbr().multiplier_learning_rate()),
-        constrained(spec.config.dbr().constraint() != DbrConfig::NONE) {}
+        multiplier(spec.config.dbr().first_multiplier(), spec.config.dbr().multiplier_learning_rate(),
+                   MultiplierLimits::Between(spec.config.dbr().min_multiplier(),
+                                             spec.config.dbr().max_multiplier())),
+        temperature(FirstTemperature(spec.config.dbr()), spec.config.dbr().temperature_learning_rate(),
+                    kTemperatureLimits),
+        constrained(spec.config.dbr().constraint() != DbrConfig::NONE),
+        soft(spec.config.dbr().first_temperature() > 0) {}
 
   const DbrConfig& config() const { return this->spec.config.dbr(); }
   BatchNeeds needs() const { return DualBehaviorNeeds(this->spec.config); }
@@ -37,16 +43,44 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
   // The multiplier of the divergence. It is 0 where there is no constraint.
   Scalar alpha() const { return constrained ? multiplier.value() : Scalar{0}; }
 
-  // Sets the learning rate of this update.
+  // The weight of the policy's entropy in the values: the temperature, or 0 where there is none.
+  Scalar tau() const { return soft ? temperature.value() : Scalar{0}; }
+  // Whether the policy's loss of this update has its Q term: false during the warm start.
+  bool uses_q() const { return this->updates >= config().warm_start_updates(); }
+  // Whether this update improves the policy, the multiplier and the temperature.
+  bool improves_policy() const { return (this->updates + 1) % config().updates_per_policy_update() == 0; }
+
+  // The weight of the entropy in the policy's loss, in units of Q.
+  double EntropyWeight() const { return soft ? static_cast<double>(tau()) : config().entropy_weight(); }
+
+  // Begins an update.
   void Begin() {
     const double learning_rate = ActorCritic<Scalar>::Begin();
     beta_plus.set_learning_rate(learning_rate);
     beta_minus.set_learning_rate(learning_rate);
   }
 
-  // Ends an update: one step of the multiplier.
-  void Finish(const PolicyLoss<Scalar>& loss) {
-    if (constrained) multiplier.Step(loss.divergence_plus - loss.threshold);
+  // Fits beta+ and beta- to the transitions of B in D+ and in D-, by the advantages of this update. The
+  // likelihoods are those of this struct's beta+ and beta-.
+  template <class Likelihood>
+  void FitBehaviorsTo(const BasicBatch<Scalar>& batch, Likelihood* plus, Likelihood* minus) {
+    partition.Split(this->advantages);
+    this->runner.Run(
+        [&] {
+          if (partition.has_plus()) plus->Fit(batch, &partition.plus(), &beta_plus);
+        },
+        [&] {
+          if (partition.has_minus()) minus->Fit(batch, &partition.minus(), &beta_minus);
+        });
+  }
+
+  // Ends an update. Where it improved the policy, the multiplier and the temperature make a step. During the
+  // warm start both stand still, for nothing there answers to them. target_entropy is in nats.
+  void Finish(const PolicyLoss<Scalar>& loss, Scalar target_entropy) {
+    if (improves_policy() && uses_q()) {
+      if (constrained) multiplier.Step(loss.divergence_plus - loss.threshold);
+      if (soft) temperature.Step(target_entropy - loss.entropy);
+    }
     ++this->updates;
   }
 
@@ -58,8 +92,10 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
     for (const int behavior : {batch.plus, batch.minus}) {
       flops += shape.ForwardFlops(behavior) + shape.ParameterGradientFlops(behavior);
     }
-    // Self-imitation fits beta+ to B. Its forward pass at s is counted below.
-    if (batch.plus == 0) flops += shape.ParameterGradientFlops(batch.uniform);
+    // Behaviours without a batch of their own are fitted to B. Their forward passes at s are counted below.
+    for (const int behavior : {batch.plus, batch.minus}) {
+      if (behavior == 0) flops += shape.ParameterGradientFlops(batch.uniform);
+    }
     // At s: pi, beta+ and beta-, whether the constraint looks at beta- or not, so that what is left out shows
     // as time. At s': the target pi', and beta+ too where the value is penalised.
     const int forward = config().value_penalty() && constrained ? 5 : 4;
@@ -71,7 +107,7 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
             {"train/beta_minus_loss"},    {"train/divergence_plus"}, {"train/divergence_minus"},
             {"train/threshold"},          {"train/multiplier"},      {"train/policy_entropy"},
             {"train/value_mean"},         {"train/target_mean"},     {"train/advantage_mean"},
-            {"train/advantage_positive"}, {"train/advantage_std"}};
+            {"train/advantage_positive"}, {"train/advantage_std"},   {"train/temperature"}};
   }
 
   // Sets `metrics`. Returns Internal where a value is not finite.
@@ -80,7 +116,7 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
     const AdvantageFigures figures = FiguresOf(this->advantages);
     return SetMetrics({fits.critic, loss.loss, fits.beta_plus, fits.beta_minus, loss.divergence_plus,
                        loss.divergence_minus, loss.threshold, alpha(), loss.entropy, loss.value, target_mean,
-                       figures.mean, figures.positive, figures.deviation},
+                       figures.mean, figures.positive, figures.deviation, tau()},
                       this->updates, metrics);
   }
 
@@ -96,19 +132,32 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
     beta_plus.Save(kBetaPlus, file);
     beta_minus.Save(kBetaMinus, file);
     multiplier.Save(file);
+    if (soft) temperature.Save(file, kTemperature);
   }
   absl::Status Load(const TensorFile& file) {
     absl::Status status = ActorCritic<Scalar>::Load(file);
     status.Update(beta_plus.Load(kBetaPlus, file));
     status.Update(beta_minus.Load(kBetaMinus, file));
     status.Update(multiplier.Load(file));
+    if (soft) status.Update(temperature.Load(file, kTemperature));
     return status;
   }
 
   TrainedNetwork<Scalar> beta_plus;
   TrainedNetwork<Scalar> beta_minus;
   Multiplier<Scalar> multiplier;
+  Multiplier<Scalar> temperature;    // not used unless `soft`
+  BatchPartition<Scalar> partition;  // of the newest B, with behavior_data BATCH
   const bool constrained;
+  const bool soft;  // whether the policy's entropy has a temperature
+
+ private:
+  static constexpr char kTemperature[] = "log_temperature";
+
+  // A logarithm must exist where there is no temperature too.
+  static double FirstTemperature(const DbrConfig& config) {
+    return config.first_temperature() > 0 ? config.first_temperature() : 1;
+  }
 };
 
 }  // namespace dbr

@@ -15,10 +15,12 @@ absl::Status Sac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicB
   networks_.Begin();
   EvaluatePolicy(uniform);
   const Scalar critic_loss = FitCritics(uniform);
-  const SoftPolicyLoss<Scalar> policy_loss = ImprovePolicy(uniform);
-  networks_.Finish(policy_loss, target_entropy_);
+  const bool improves =
+      (networks_.updates + 1) % networks_.spec.config.sac().updates_per_policy_update() == 0;
+  ImprovePolicy(uniform, improves);
+  networks_.Finish(policy_loss_, target_entropy_, improves);
   networks_.SetAdvantages(regression_.behavior_value() - value_);
-  return networks_.Report(critic_loss, policy_loss, regression_.target().mean(), &metrics_);
+  return networks_.Report(critic_loss, policy_loss_, regression_.target().mean(), &metrics_);
 }
 
 template <class Scalar>
@@ -41,15 +43,18 @@ Scalar Sac<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
 }
 
 template <class Scalar>
-SoftPolicyLoss<Scalar> Sac<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
+void Sac<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch, bool improves) {
   const Eigen::Index n = batch.size();
   FillNormal(networks_.rng, networks_.spec.actions.size, n, &noise_);
-  const SoftPolicyLoss<Scalar> loss = objective_.Compute(
-      head_, batch.observations, noise_, networks_.temperature.value(), &networks_.critics, &d_output_);
-  networks_.policy.Step(batch.observations, d_output_);
+  if (improves) {
+    policy_loss_ = objective_.Compute(head_, batch.observations, noise_, networks_.temperature.value(),
+                                      &networks_.critics, &d_output_);
+    networks_.policy.Step(batch.observations, d_output_);
+  } else {
+    objective_.Evaluate({head_, batch.observations, noise_}, &networks_.critics);
+  }
   value_.resize(n);
   MeanOfSmaller<Scalar>(networks_.critics.value1(), networks_.critics.value2(), &value_);
-  return loss;
 }
 
 template <class Scalar>

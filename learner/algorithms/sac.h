@@ -22,9 +22,10 @@ namespace dbr {
 //   2. pi minimises E[temperature * log pi(a|s) - min_i Q_i(s, a)], where a is drawn from pi and the gradient
 //      flows through the draw (equation 9).
 //   3. The temperature rises where the entropy is below its target and falls above it (equation 18).
+//      Steps 2 and 3 are made in every updates_per_policy_update-th update.
 //   4. Polyak averaging of the critics.
 //   5. A = Q(s, a) - V(s) for every transition of B. Q is the smaller twin before its step, and V is the
-//      smaller twin at the action that step 2 drew.
+//      smaller twin at an action drawn as in step 2.
 template <class Scalar>
 class Sac : public ActorCriticAlgorithm<SoftNetworks<Scalar>> {
  public:
@@ -44,9 +45,11 @@ class Sac : public ActorCriticAlgorithm<SoftNetworks<Scalar>> {
   // Evaluates the policy at s' and at s.
   void EvaluatePolicy(const BasicBatch<Scalar>& batch);
   Scalar FitCritics(const BasicBatch<Scalar>& batch);
-  SoftPolicyLoss<Scalar> ImprovePolicy(const BasicBatch<Scalar>& batch);
+  // Makes a step of the policy where `improves`, and sets value_.
+  void ImprovePolicy(const BasicBatch<Scalar>& batch, bool improves);
 
-  Scalar target_entropy_;  // nats
+  Scalar target_entropy_;               // nats
+  SoftPolicyLoss<Scalar> policy_loss_;  // of the newest update that improved the policy
 
   GaussianHead<Scalar> head_, next_head_;  // pi at s, pi at s'
   SampledActions<Scalar> next_draws_;

@@ -12,10 +12,6 @@
 
 namespace dbr {
 
-// The limits of log(temperature). A temperature may fall low where rewards are small. Above e^5 training has
-// failed.
-inline constexpr MultiplierLimits kTemperatureLimits{.min_log = -20, .max_log = 5};
-
 // SAC's networks. The algorithm owns them. One thread at a time.
 template <class Scalar>
 struct SoftNetworks : ActorCritic<Scalar> {
@@ -25,10 +21,10 @@ struct SoftNetworks : ActorCritic<Scalar> {
       : ActorCritic<Scalar>(spec, /*policy_target=*/false),
         temperature(config.first_temperature(), config.temperature_learning_rate(), kTemperatureLimits) {}
 
-  // Ends an update: one step of the temperature. The temperature rises while the policy's
-  // entropy is below target_entropy. Both are in nats.
-  void Finish(const SoftPolicyLoss<Scalar>& loss, Scalar target_entropy) {
-    temperature.Step(target_entropy - loss.entropy);
+  // Ends an update: one step of the temperature, where the update improved the policy. The temperature rises
+  // while the policy's entropy is below target_entropy. Both are in nats.
+  void Finish(const SoftPolicyLoss<Scalar>& loss, Scalar target_entropy, bool improved = true) {
+    if (improved) temperature.Step(target_entropy - loss.entropy);
     ++this->updates;
   }
 

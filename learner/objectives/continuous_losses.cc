@@ -19,12 +19,13 @@ Scalar SquaredError(const ConstMatrixRef<Scalar>& q, const VectorX<Scalar>& y, M
 
 template <class Scalar>
 void GreatestTargetValue(const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar>& q2,
-                         Scalar min_weight, VectorX<Scalar>* value) {
+                         Scalar min_weight, VectorX<Scalar>* value, const SoftValue<Scalar>* soft) {
   const Eigen::Index n = value->size();
   DBR_CHECK(n > 0 && q1.cols() % n == 0 && q2.cols() == q1.cols());
   for (Eigen::Index j = 0; j < q1.cols(); ++j) {
     const Scalar low = SmallerOrNan(q1(0, j), q2(0, j)), high = GreaterOrNan(q1(0, j), q2(0, j));
-    const Scalar each = min_weight * low + (1 - min_weight) * high;
+    Scalar each = min_weight * low + (1 - min_weight) * high;
+    if (soft != nullptr) each -= soft->temperature * soft->log_prob[j];
     Scalar& greatest = (*value)[j % n];
     greatest = j < n ? each : GreaterOrNan(greatest, each);
   }
@@ -63,9 +64,9 @@ void SmallerMeanQTerm(const QTermOptions& options, const ConstMatrixRef<Scalar>&
   }
   const auto states = static_cast<Scalar>(n);
   term->value = sum / states;
-  const Scalar scale = options.normalize ? std::max(size / states, Scalar{1e-6}) : Scalar{1};
-  const Scalar each = options.use_q ? 1 / (scale * states * static_cast<Scalar>(count)) : Scalar{0};
-  term->loss = options.use_q ? -term->value / scale : Scalar{0};
+  term->scale = options.normalize ? std::max(size / states, Scalar{1e-6}) : Scalar{1};
+  const Scalar each = options.use_q ? 1 / (term->scale * states * static_cast<Scalar>(count)) : Scalar{0};
+  term->loss = options.use_q ? -term->value / term->scale : Scalar{0};
   term->d_q1 *= each;
   term->d_q2 *= each;
 }
@@ -74,7 +75,7 @@ void SmallerMeanQTerm(const QTermOptions& options, const ConstMatrixRef<Scalar>&
   template Scalar SquaredError<Scalar>(const ConstMatrixRef<Scalar>&, const VectorX<Scalar>&,             \
                                        MatrixX<Scalar>*);                                                 \
   template void GreatestTargetValue<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&, \
-                                            Scalar, VectorX<Scalar>*);                                    \
+                                            Scalar, VectorX<Scalar>*, const SoftValue<Scalar>*);          \
   template void MeanOfSmaller<Scalar>(const ConstMatrixRef<Scalar>&, const ConstMatrixRef<Scalar>&,       \
                                       VectorX<Scalar>*);                                                  \
   template void SmallerMeanQTerm<Scalar>(const QTermOptions&, const ConstMatrixRef<Scalar>&,              \

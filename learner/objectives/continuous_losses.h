@@ -15,11 +15,19 @@ namespace dbr {
 template <class Scalar>
 Scalar SquaredError(const ConstMatrixRef<Scalar>& q, const VectorX<Scalar>& y, MatrixX<Scalar>* d_q);
 
+// The price of a draw's log-probability in a value: value - temperature * log pi(a|s).
+template <class Scalar>
+struct SoftValue {
+  Scalar temperature = 0;
+  const VectorX<Scalar>& log_prob;  // [count * n]
+};
+
 // Sets `value` [n] to V'(s'): the greatest value, over a state's draws, of min_weight * min_i Q'_i + (1 -
-// min_weight) * max_i Q'_i (Kumar et al. 2019, algorithm 1). Requires that `value` has its size n.
+// min_weight) * max_i Q'_i (Kumar et al. 2019, algorithm 1), less `soft`'s price where it is not null.
+// Requires that `value` has its size n.
 template <class Scalar>
 void GreatestTargetValue(const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar>& q2,
-                         Scalar min_weight, VectorX<Scalar>* value);
+                         Scalar min_weight, VectorX<Scalar>* value, const SoftValue<Scalar>* soft = nullptr);
 
 // Sets `value` [n] to the mean over a state's draws of the smaller twin. Requires that `value` has its size
 // n.
@@ -32,6 +40,7 @@ template <class Scalar>
 struct QTerm {
   Scalar loss = 0;
   Scalar value = 0;            // E[min_i mean_k Q_i(s, a_k)], not scaled
+  Scalar scale = 1;            // what the values are divided by
   MatrixX<Scalar> d_q1, d_q2;  // [1 x count * n]
 };
 

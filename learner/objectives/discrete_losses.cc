@@ -11,10 +11,10 @@ namespace dbr {
 namespace {
 
 // Adds -E[min_i sum_a pi Q_i] / scale to the loss. Adds its gradient with respect to pi's probabilities to
-// `gradient`.
+// `gradient`. Returns the scale.
 template <class Scalar>
-void AddQTerm(const PolicyLossOptions& options, const ValuedPolicy<Scalar>& at,
-              ConstrainedLoss<Scalar>* result, MatrixX<Scalar>* gradient) {
+Scalar AddQTerm(const PolicyLossOptions& options, const ValuedPolicy<Scalar>& at,
+                ConstrainedLoss<Scalar>* result, MatrixX<Scalar>* gradient) {
   const auto& [policy, q1, q2] = at;
   const Eigen::Index n = q1.cols();
   Scalar sum = 0, size = 0;
@@ -29,12 +29,13 @@ void AddQTerm(const PolicyLossOptions& options, const ValuedPolicy<Scalar>& at,
   result->value = sum / static_cast<Scalar>(n);
   if (!options.use_q) {
     gradient->setZero();
-    return;
+    return 1;
   }
   const Scalar mean_size = size / static_cast<Scalar>(n);
   const Scalar scale = options.normalize_q ? std::max(mean_size, Scalar{1e-6}) : Scalar{1};
   *gradient /= scale * static_cast<Scalar>(n);
   result->loss -= result->value / scale;
+  return scale;
 }
 
 // Returns the mean entropy of the policy. Adds the gradient of -weight times the mean entropy, with respect
@@ -45,6 +46,16 @@ Scalar AddEntropyTerm(const Categorical<Scalar>& policy, Scalar weight, VectorX<
   Entropy(policy, entropy);
   *gradient += weight / static_cast<Scalar>(entropy->size()) * policy.log_probabilities;
   return entropy->mean();
+}
+
+// Cuts each divergence [n] at `limit`. The gradient of a state beyond it becomes 0.
+template <class Scalar>
+void LimitDivergence(Scalar limit, VectorX<Scalar>* divergence, MatrixX<Scalar>* gradient) {
+  for (Eigen::Index j = 0; j < divergence->size(); ++j) {
+    if (!((*divergence)[j] > limit)) continue;
+    (*divergence)[j] = limit;
+    gradient->col(j).setZero();
+  }
 }
 
 }  // namespace
@@ -113,7 +124,8 @@ void Divergence(DbrConfig::Divergence kind, Scalar mmd_sigma, const Categorical<
     if (d_probabilities != nullptr) *d_probabilities = p.log_probabilities - q.log_probabilities;
     return;
   }
-  CategoricalMmd<Scalar>(p.probabilities, q.probabilities, mmd_sigma, divergence, d_probabilities);
+  const auto mmd = kind == DbrConfig::MMD_SQUARED ? SquaredCategoricalMmd<Scalar> : CategoricalMmd<Scalar>;
+  mmd(p.probabilities, q.probabilities, mmd_sigma, divergence, d_probabilities);
 }
 
 template <class Scalar>
@@ -126,7 +138,7 @@ ConstrainedLoss<Scalar> ConstrainedPolicyLoss(const PolicyLossOptions& options,
   const Categorical<Scalar>& policy = at.policy;
   const auto n = static_cast<Scalar>(policy.probabilities.cols());
   d_logits->setZero(policy.probabilities.rows(), policy.probabilities.cols());
-  AddQTerm(options, at, &result, d_logits);
+  const Scalar scale = AddQTerm(options, at, &result, d_logits);
 
   Divergence(options.divergence, static_cast<Scalar>(options.mmd_sigma), policy, constraint.beta,
              &workspace->plus, &workspace->d_plus);
@@ -135,7 +147,7 @@ ConstrainedLoss<Scalar> ConstrainedPolicyLoss(const PolicyLossOptions& options,
   result.loss += constraint.alpha * (result.divergence - result.threshold);
   *d_logits += constraint.alpha / n * workspace->d_plus;
 
-  const auto entropy_weight = static_cast<Scalar>(options.entropy_weight);
+  const auto entropy_weight = options.use_q ? static_cast<Scalar>(options.entropy_weight) / scale : Scalar{0};
   result.entropy = AddEntropyTerm(policy, entropy_weight, &workspace->entropy, d_logits);
   result.loss -= entropy_weight * result.entropy;
   SoftmaxGradient(policy, d_logits);
@@ -148,14 +160,18 @@ PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, cons
                                           const Categorical<Scalar>& beta_plus,
                                           const Categorical<Scalar>& beta_minus, Scalar alpha,
                                           PolicyLossWorkspace<Scalar>* workspace, MatrixX<Scalar>* d_logits) {
-  Scalar divergence_minus = 0;
+  Scalar divergence_minus = 0, limited_minus = 0;
   if (IsMovedByMinus(options.constraint)) {
     Divergence(options.divergence, static_cast<Scalar>(options.mmd_sigma), policy, beta_minus,
                &workspace->minus, &workspace->d_minus);
     divergence_minus = workspace->minus.mean();
+    if (options.limits_repulsion()) {
+      LimitDivergence(static_cast<Scalar>(options.max_repulsion), &workspace->minus, &workspace->d_minus);
+    }
+    limited_minus = workspace->minus.mean();
   }
   const Threshold<Scalar> threshold =
-      ThresholdOf(options.constraint, static_cast<Scalar>(options.epsilon), divergence_minus);
+      ThresholdOf(options.constraint, static_cast<Scalar>(options.epsilon), limited_minus);
   const Scalar weight = options.constraint == DbrConfig::NONE ? Scalar{0} : alpha;
   const ConstrainedLoss<Scalar> loss = ConstrainedPolicyLoss<Scalar>(
       options, {policy, q1, q2}, {beta_plus, threshold.value, weight}, workspace, d_logits);

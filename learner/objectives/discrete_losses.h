@@ -69,7 +69,7 @@ struct BehaviorConstraint {
   Scalar alpha;
 };
 
-// Returns BEAR's policy loss, -E[min_i sum_a pi Q_i] / scale - w H(pi) + alpha * (D(pi, beta) - c)
+// Returns BEAR's policy loss, -(E[min_i sum_a pi Q_i] + w H(pi)) / scale + alpha * (D(pi, beta) - c)
 // (docs/algorithms.md). Sets `d_logits` [actions x n] to its gradient with respect to the policy's logits.
 // Everything but the policy is a constant. So is the scale: with normalize_q the mean over the batch of sum_a
 // pi |Q_i| with the smaller twin Q_i, at least 1e-6; else 1.
@@ -80,10 +80,11 @@ ConstrainedLoss<Scalar> ConstrainedPolicyLoss(const PolicyLossOptions& options,
                                               PolicyLossWorkspace<Scalar>* workspace,
                                               MatrixX<Scalar>* d_logits);
 
-// Returns DBR's policy loss, -E[min_i sum_a pi Q_i] / scale - w H(pi) + alpha * (D(pi, beta+) - c).
-// options.constraint sets c (docs/algorithms.md, DBR step 3); NONE leaves that term out. Sets `d_logits`
-// [actions x n] to the loss's gradient with respect to the policy's logits. q1 and q2 [actions x n], beta+,
-// beta-, alpha and the scale are constants. c is a constant too, unless repel_negative is set.
+// Returns DBR's policy loss, -(E[min_i sum_a pi Q_i] + w H(pi)) / scale + alpha * (D(pi, beta+) - c).
+// options.constraint sets c (docs/algorithms.md, DBR step 3); NONE leaves that term out. With repel_negative
+// and a max_repulsion, the D(pi, beta-) of which c is the mean is cut at max_repulsion in each state. Sets
+// `d_logits` [actions x n] to the loss's gradient with respect to the policy's logits. q1 and q2 [actions x
+// n], beta+, beta-, alpha and the scale are constants. c is a constant too, unless repel_negative is set.
 template <class Scalar>
 PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, const Categorical<Scalar>& policy,
                                           const ConstMatrixRef<Scalar>& q1, const ConstMatrixRef<Scalar>& q2,

@@ -14,11 +14,13 @@ inline bool ImitatesItself(const DbrConfig& config) {
   return config.advantage() == DbrConfig::SIL;
 }
 
-// The batches of one update: B from D for the critics and the policy, B+ and B- for the behaviour policies.
+// The batches of one update: B from D for the critics and the policy, B+ and B- for the behaviour policies
+// unless these are fitted to B too.
 inline BatchNeeds DualBehaviorNeeds(const AlgorithmConfig& config) {
   const int batch = static_cast<int>(config.batch_size());
   const int behavior =
       config.dbr().behavior_batch_size() > 0 ? static_cast<int>(config.dbr().behavior_batch_size()) : batch;
+  if (config.dbr().behavior_data() == DbrConfig::BATCH) return {.uniform = batch};
   return {.uniform = batch, .plus = ImitatesItself(config.dbr()) ? 0 : behavior, .minus = behavior};
 }
 
@@ -28,9 +30,13 @@ struct PolicyLossOptions {
   double epsilon = 0.05;
   double mmd_sigma = 1;
   bool repel_negative = false;
+  double max_repulsion = 0;  // the largest D(pi, beta-) of a state that counts; 0 for no limit
   bool normalize_q = false;
-  double entropy_weight = 0;
-  bool use_q = true;  // false during the warm start
+  double entropy_weight = 0;  // of the policy's entropy in nats, in units of Q
+  bool use_q = true;          // false during the warm start: neither Q nor the entropy is in the loss
+
+  // Whether the repulsion from beta- has a limit.
+  bool limits_repulsion() const { return repel_negative && max_repulsion > 0; }
 
   static PolicyLossOptions Of(const DbrConfig& config) {
     return {.constraint = config.constraint(),
@@ -38,6 +44,7 @@ struct PolicyLossOptions {
             .epsilon = config.epsilon(),
             .mmd_sigma = config.mmd_sigma(),
             .repel_negative = config.repel_negative(),
+            .max_repulsion = config.max_repulsion(),
             .normalize_q = config.normalize_q(),
             .entropy_weight = config.entropy_weight(),
             .use_q = config.warm_start_updates() == 0};

@@ -28,17 +28,23 @@ struct PolicyHeads {
 template <class Scalar>
 class DualBehaviorObjective {
  public:
-  // Returns -E[min_i mean_k Q_i(s, a_k)] / scale - w H(pi) + alpha * (D(pi, beta+) - c), with the a_k drawn
+  // Returns -(E[min_i mean_k Q_i(s, a_k)] + w H(pi)) / scale + alpha * (D(pi, beta+) - c), with the a_k drawn
   // from pi. options.constraint sets c (docs/algorithms.md, DBR step 3); NONE leaves that term out. The
-  // entropy H is the estimate from the draws. `d_output` [2 * dimensions x n] becomes the loss's gradient
-  // with respect to the output of pi's network. beta+, beta-, alpha, the critics' weights and normalize_q's
-  // scale are constants. c is a constant too, unless repel_negative is set.
+  // entropy H is the estimate from the draws. With repel_negative and a max_repulsion, the D(pi, beta-) of
+  // which c is the mean is cut at max_repulsion in each state. `d_output` [2 * dimensions x n] becomes the
+  // loss's gradient with respect to the output of pi's network. beta+, beta-, alpha, the critics' weights and
+  // normalize_q's scale are constants. c is a constant too, unless repel_negative is set.
   PolicyLoss<Scalar> Compute(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
                              const MatrixX<Scalar>& observations, const ObjectiveNoise<Scalar>& noise,
                              Scalar alpha, TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output);
 
-  // Sets `value` [n] to V(s): the mean of the smaller twin over the draws of the newest Compute. Requires
-  // that `value` has its size n.
+  // Evaluates the critics at draws from pi, for StateValue alone.
+  void Evaluate(const PolicyDraws<Scalar>& at, TwinCritic<Scalar>* critics) {
+    q_objective_.Evaluate(at, critics);
+  }
+
+  // Sets `value` [n] to V(s): the mean of the smaller twin over the draws of the newest Compute or Evaluate.
+  // Requires that `value` has its size n.
   void StateValue(const TwinCritic<Scalar>& critics, VectorX<Scalar>* value) const {
     MeanOfSmaller<Scalar>(critics.value1(), critics.value2(), value);
   }

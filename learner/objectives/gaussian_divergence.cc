@@ -31,6 +31,9 @@ void GaussianDivergence<Scalar>::Compute(const GaussianDivergenceOptions& option
     case DbrConfig::MMD_EXACT:
       ExactMmd<Scalar>(pi.view(), beta.view(), options.mmd_sigma, &value_, &gradient_);
       return;
+    case DbrConfig::MMD_SQUARED:
+      SquaredMmd<Scalar>(pi.view(), beta.view(), options.mmd_sigma, &value_, &gradient_);
+      return;
     case DbrConfig::MMD_LAPLACIAN:
     case DbrConfig::MMD_GAUSSIAN:
       Spread(beta, noise.beta, &beta_samples_);

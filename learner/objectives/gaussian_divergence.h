@@ -38,6 +38,16 @@ class GaussianDivergence {
   void ComputeFrom(const GaussianDivergenceOptions& options, const GaussianHead<Scalar>& pi,
                    const MatrixX<Scalar>& pi_noise, const MatrixX<Scalar>& beta_samples);
 
+  // Replaces value() by min(value(), limit). The gradient of a state beyond the limit becomes 0.
+  void LimitTo(Scalar limit) {
+    for (Eigen::Index j = 0; j < value_.size(); ++j) {
+      if (!(value_[j] > limit)) continue;
+      value_[j] = limit;
+      gradient_.mean.col(j).setZero();
+      gradient_.log_std.col(j).setZero();
+    }
+  }
+
   // Adds weight times gradient() to `sum`.
   void AddGradient(Scalar weight, GaussianGradient<Scalar>* sum) const {
     sum->mean += weight * gradient_.mean;

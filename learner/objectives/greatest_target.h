@@ -1,6 +1,8 @@
 // V'(s') over continuous actions, as BEAR and DBR compute it.
 #pragma once
 
+#include <optional>
+
 #include "learner/objectives/continuous_losses.h"
 #include "learner/objectives/sampled_actions.h"
 #include "learner/training/trained_network.h"
@@ -18,13 +20,21 @@ class GreatestTarget {
   }
 
   // Returns V'(s') [n]: the greatest value of min_weight * min_i Q'_i + (1 - min_weight) * max_i Q'_i over
-  // draws from pi' (Kumar et al. 2019, algorithm 1). noise [dimensions x count * n]. No gradient is taken.
+  // draws from pi' (Kumar et al. 2019, algorithm 1). With a temperature it is the greatest value of that less
+  // temperature * log pi'(a'|s'). noise [dimensions x count * n]. No gradient is taken.
   const VectorX<Scalar>& Compute(const MatrixX<Scalar>& next_observations, const MatrixX<Scalar>& noise,
-                                 Scalar min_weight, TwinCritic<Scalar>* critics) {
-    draws_.DrawActions(pi_, noise);
+                                 Scalar min_weight, TwinCritic<Scalar>* critics,
+                                 std::optional<Scalar> temperature = std::nullopt) {
+    if (temperature) {
+      draws_.Draw(pi_, noise);
+    } else {
+      draws_.DrawActions(pi_, noise);
+    }
     critics->EvaluateTargets(draws_.CriticInput(next_observations));
     value_.resize(next_observations.cols());
-    GreatestTargetValue<Scalar>(critics->target1(), critics->target2(), min_weight, &value_);
+    const SoftValue<Scalar> soft{temperature.value_or(0), draws_.sample().log_prob};
+    GreatestTargetValue<Scalar>(critics->target1(), critics->target2(), min_weight, &value_,
+                                temperature ? &soft : nullptr);
     return value_;
   }
 

@@ -26,23 +26,30 @@ struct PolicyDraws {
 template <class Scalar>
 class SampledQObjective {
  public:
-  // Returns -E[min_i mean_k Q_i(s, a_k)] / scale - entropy_weight * H(pi), with the a_k drawn from pi and the
-  // entropy H estimated from the draws. Overwrites `gradient` with the gradient with respect to pi's
-  // parameters. The critics' weights, entropy_weight and the scale (SmallerMeanQTerm) are constants.
+  // Evaluates the critics at draws from pi, without a loss.
+  void Evaluate(const PolicyDraws<Scalar>& at, TwinCritic<Scalar>* critics) {
+    draws_.Draw(at.pi, at.noise);
+    critics->Evaluate(draws_.CriticInput(at.observations));
+  }
+
+  // Returns -(E[min_i mean_k Q_i(s, a_k)] + entropy_weight * H(pi)) / scale, with the a_k drawn from pi and
+  // the entropy H estimated from the draws; 0 with use_q false. Overwrites `gradient` with the gradient with
+  // respect to pi's parameters. The critics' weights, entropy_weight and the scale (SmallerMeanQTerm) are
+  // constants.
   SoftPolicyLoss<Scalar> Compute(const SampledQOptions<Scalar>& options, const PolicyDraws<Scalar>& at,
                                  TwinCritic<Scalar>* critics, GaussianGradient<Scalar>* gradient) {
     const Eigen::Index n = at.observations.cols();
-    draws_.Draw(at.pi, at.noise);
-    critics->Evaluate(draws_.CriticInput(at.observations));
+    Evaluate(at, critics);
     SmallerMeanQTerm<Scalar>(options.q, critics->value1(), critics->value2(), n, &q_term_);
     const VectorX<Scalar>& log_prob = draws_.sample().log_prob;
-    d_log_prob_.setConstant(log_prob.size(), options.entropy_weight / static_cast<Scalar>(log_prob.size()));
+    const Scalar entropy_weight = options.q.use_q ? options.entropy_weight / q_term_.scale : Scalar{0};
+    d_log_prob_.setConstant(log_prob.size(), entropy_weight / static_cast<Scalar>(log_prob.size()));
     gradient->mean.setZero(at.noise.rows(), n);
     gradient->log_std.setZero(at.noise.rows(), n);
     draws_.Backprop(critics->InputGradient(q_term_.d_q1, q_term_.d_q2, at.noise.rows()), d_log_prob_,
                     gradient);
     const Scalar entropy = -log_prob.mean();
-    return {q_term_.loss - options.entropy_weight * entropy, q_term_.value, entropy};
+    return {q_term_.loss - entropy_weight * entropy, q_term_.value, entropy};
   }
 
  private:

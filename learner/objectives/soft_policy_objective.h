@@ -23,6 +23,11 @@ class SoftPolicyObjective {
     return loss;
   }
 
+  // Evaluates the critics at draws from pi, without a loss.
+  void Evaluate(const PolicyDraws<Scalar>& at, TwinCritic<Scalar>* critics) {
+    q_objective_.Evaluate(at, critics);
+  }
+
  private:
   SampledQObjective<Scalar> q_objective_;
   GaussianGradient<Scalar> gradient_;

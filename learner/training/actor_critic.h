@@ -1,4 +1,4 @@
-// What every actor-critic trains and keeps, with any loss: a policy, twin critics, a random generator, a
+// What every actor-critic trains and keeps, with any loss: a policy, critics, a random generator, a
 // counter, and the advantages of the newest update. An algorithm holds one of these, or a struct that derives
 // from it and adds networks.
 #pragma once
@@ -29,7 +29,9 @@ struct ActorCritic {
         rng(spec.seed),
         runner(UpdateThreads(spec.config)),
         policy(PolicyShape(PolicySpecOf(spec)), Options(spec, policy_target), rng),
-        critics(CriticShape(PolicySpecOf(spec)), Options(spec, /*with_target=*/true), rng, &runner) {}
+        critics(CriticShape(PolicySpecOf(spec)), Options(spec, /*with_target=*/true), rng, &runner,
+                {.critics = static_cast<int>(spec.config.critics()),
+                 .asked = static_cast<int>(spec.config.target_critics())}) {}
 
   // How the networks of `algorithm_spec` are trained.
   static TrainingOptions Options(const AlgorithmSpec& algorithm_spec, bool with_target) {
@@ -41,11 +43,13 @@ struct ActorCritic {
   // Every transition of the batch is drawn from D.
   BatchNeeds needs() const { return {.uniform = static_cast<int>(spec.config.batch_size())}; }
 
-  // Sets the learning rate of this update, and whether its steps move the targets of the critics and, where
-  // it has one, of the policy. Returns the learning rate, for networks that are not in this struct.
+  // Draws the twins of this update. Sets its learning rate, and whether its steps move the targets of the
+  // critics and, where it has one, of the policy. Returns the learning rate, for networks that are not in
+  // this struct.
   double Begin(bool move_targets = true) {
     const double learning_rate = LearningRate(spec.config, updates);
     const double tau = move_targets ? spec.config.target_tau() : 0;
+    critics.ChooseTwins(rng);
     policy.set_learning_rate(learning_rate);
     critics.set_learning_rate(learning_rate);
     policy.set_target_tau(tau);
@@ -89,7 +93,7 @@ struct ActorCritic {
   PairRunner runner;
   TrainedNetwork<Scalar> policy;
   TwinCritic<Scalar> critics;
-  std::uint64_t updates = 0;
+  std::uint64_t updates = 0;      // that are complete
   std::vector<float> advantages;  // [n] for the newest update's uniform batch
 };
 

@@ -9,6 +9,7 @@
 #include "core/file_io.h"
 #include "core/status_macros.h"
 #include "proto/config/config_check.h"
+#include "proto/config/config_combinations.h"
 #include "proto/config/config_override.h"
 #include "proto/config/config_text.h"
 
@@ -77,6 +78,7 @@ absl::StatusOr<Config> Parse(absl::string_view text, const std::vector<std::stri
   }
   DefaultAlgorithm(&config);
   FindViolations(config, "", &errors);
+  FindContradictions(config, &errors);
   RETURN_IF_ERROR(AllErrors(errors, source));
   return config;
 }

@@ -54,10 +54,22 @@ constexpr Effect kEffects[] = {
     {"dbr", "advantage",
      "advantage: SIL"},  // the replay server applies ARM_CUMULATIVE (tests/learner/runtime/trainer_test.cc)
     {"dbr", "munchausen_weight", "munchausen_weight: 0.9"},
+    {"dbr", "first_temperature", "first_temperature: 0.5"},
+    {"dbr", "temperature_learning_rate", "temperature_learning_rate: 0.1", "first_temperature: 1"},
+    {"dbr", "target_entropy", "target_entropy: 5", "first_temperature: 1 temperature_learning_rate: 0.1"},
+    {"dbr", "target_entropy_ratio", "target_entropy_ratio: 0.1",
+     "first_temperature: 1 temperature_learning_rate: 0.1"},
+    {"dbr", "max_repulsion", "max_repulsion: 1e-3", "repel_negative: true epsilon: 1e-6"},
+    {"dbr", "min_multiplier", "min_multiplier: 0.9", "multiplier_learning_rate: 0.1 epsilon: 10"},
+    {"dbr", "max_multiplier", "max_multiplier: 1.1",
+     "multiplier_learning_rate: 0.1 constraint: FIXED epsilon: 1e-6"},
+    {"dbr", "updates_per_policy_update", "updates_per_policy_update: 3"},
+    {"dbr", "behavior_data", "behavior_data: BATCH"},
 
     {"sac", "first_temperature", "first_temperature: 0.1"},
     {"sac", "temperature_learning_rate", "temperature_learning_rate: 0.1"},
     {"sac", "target_entropy", "target_entropy: 5", "temperature_learning_rate: 0.1"},
+    {"sac", "updates_per_policy_update", "updates_per_policy_update: 3"},
 
     {"bear", "divergence", "divergence: MMD_GAUSSIAN"},
     {"bear", "divergence", "divergence: KL"},
@@ -73,7 +85,7 @@ constexpr Effect kEffects[] = {
     {"bear", "vae_hidden_sizes", "vae_hidden_sizes: [8, 8]"},
     {"bear", "vae_kl_weight", "vae_kl_weight: 2"},
     {"bear", "vae_latent_limit", "vae_latent_limit: 0.1"},
-    {"bear", "entropy_weight", "entropy_weight: 0.5"},
+    {"bear", "entropy_weight", "entropy_weight: 0.5", "warm_start_updates: 0"},
 
     {"brac", "variant", "variant: VP"},
     {"brac", "first_multiplier", "first_multiplier: 2"},

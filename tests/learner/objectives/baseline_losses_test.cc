@@ -69,12 +69,14 @@ TEST_F(BehaviorKlTest, APolicyEqualToTheBehaviourHasNoDivergence) {
   EXPECT_NEAR(Loss(same, true, &gradient).divergence, 0, 1e-12);
 }
 
-TEST_F(BehaviorKlTest, AClippedLogStdHasNoGradient) {
-  Matrix output = output_, gradient;
-  output(kDimensions, 0) = 2.5;
-  Loss(output, true, &gradient);
-  EXPECT_EQ(gradient(kDimensions, 0), 0);
-  EXPECT_NE(gradient(kDimensions, 1), 0);
+TEST_F(BehaviorKlTest, AClippedLogStdHasTheGradientThatLeadsBackAlone) {
+  Matrix output = output_, at_limit, beyond;
+  output.row(kDimensions).setConstant(kPolicyLogStd.max);
+  Loss(output, true, &at_limit);
+  output.row(kDimensions).setConstant(kPolicyLogStd.max + 0.5);
+  Loss(output, true, &beyond);
+  EXPECT_EQ(beyond.row(kDimensions), at_limit.row(kDimensions).cwiseMax(0));
+  EXPECT_FALSE(at_limit.row(kDimensions).isZero(0));
 }
 
 class DeterministicPolicyTest : public PolicyLossTest {

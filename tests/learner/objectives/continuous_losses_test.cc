@@ -234,13 +234,16 @@ TEST_P(ObjectiveTest, GradientMatchesDifferences) {
       gradient, [&](const Matrix& at) { return Objective(at, loss); }, output_);
 }
 
-TEST_P(ObjectiveTest, AClippedLogStdHasNoGradient) {
+TEST_P(ObjectiveTest, AClippedLogStdHasTheGradientThatLeadsBackAlone) {
   Matrix output = output_;
-  output(kDimensions, 0) = 2.5;
-  Matrix gradient;
-  Loss(output, &gradient);
-  EXPECT_EQ(gradient(kDimensions, 0), 0);
-  EXPECT_NE(gradient(kDimensions, 1), 0);
+  Matrix at_limit, beyond;
+  output.row(kDimensions).setConstant(kPolicyLogStd.max);
+  Loss(output, &at_limit);
+  output.row(kDimensions).setConstant(kPolicyLogStd.max + 0.5);
+  Loss(output, &beyond);
+  // A step goes against the gradient.
+  EXPECT_EQ(beyond.row(kDimensions), at_limit.row(kDimensions).cwiseMax(0));
+  EXPECT_FALSE(at_limit.row(kDimensions).isZero(0));
 }
 
 INSTANTIATE_TEST_SUITE_P(Variants, ObjectiveTest,

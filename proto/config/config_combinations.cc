@@ -1,0 +1,68 @@
+#include "proto/config/config_combinations.h"
+
+#include "absl/strings/str_cat.h"
+
+namespace dbr {
+namespace {
+
+void CheckMultiplier(const DbrConfig& dbr, std::vector<std::string>* errors) {
+  const double min = dbr.min_multiplier(), max = dbr.max_multiplier();
+  if (min > max) {
+    errors->push_back(absl::StrCat("algorithm.dbr.min_multiplier: expected at most max_multiplier (", max,
+                                   "), found ", min));
+  } else if (dbr.first_multiplier() < min || dbr.first_multiplier() > max) {
+    errors->push_back(absl::StrCat("algorithm.dbr.first_multiplier: expected min_multiplier (", min,
+                                   ") to max_multiplier (", max, "), found ", dbr.first_multiplier()));
+  }
+}
+
+void CheckTemperature(const DbrConfig& dbr, std::vector<std::string>* errors) {
+  if (dbr.first_temperature() == 0) return;
+  if (dbr.entropy_weight() > 0) {
+    errors->push_back(
+        absl::StrCat("algorithm.dbr.entropy_weight: expected 0 with a first_temperature above 0, which "
+                     "weighs the entropy in its place, found ",
+                     dbr.entropy_weight()));
+  }
+  const bool has_target = dbr.has_target_entropy() || dbr.has_target_entropy_ratio();
+  if (dbr.constraint() == DbrConfig::NONE && !has_target) {
+    errors->push_back(
+        "algorithm.dbr.target_entropy: expected a value where constraint is NONE and first_temperature is "
+        "above 0 (or target_entropy_ratio for discrete actions), found none");
+  }
+}
+
+void CheckDbr(const Config& config, std::vector<std::string>* errors) {
+  const DbrConfig& dbr = config.algorithm().dbr();
+  CheckMultiplier(dbr, errors);
+  CheckTemperature(dbr, errors);
+  // A config that was printed with all of its fields has the default here.
+  if (!dbr.repel_negative() && dbr.max_repulsion() != DbrConfig::default_instance().max_repulsion()) {
+    errors->push_back(absl::StrCat("algorithm.dbr.max_repulsion: expected repel_negative: true with it, ",
+                                   "found ", dbr.max_repulsion(), " and repel_negative: false"));
+  }
+  if (dbr.behavior_data() == DbrConfig::BATCH && dbr.advantage() == DbrConfig::SIL) {
+    errors->push_back(
+        "algorithm.dbr.behavior_data: expected PARTITIONS with advantage: SIL, which fits beta+ to the batch "
+        "in its own way, found BATCH");
+  }
+  if (dbr.munchausen_weight() > 0 && config.algorithm().n_step() > 1) {
+    errors->push_back(
+        absl::StrCat("algorithm.n_step: expected 1 with a munchausen_weight above 0, which raises the reward "
+                     "of a single step, found ",
+                     config.algorithm().n_step()));
+  }
+}
+
+}  // namespace
+
+void FindContradictions(const Config& config, std::vector<std::string>* errors) {
+  const AlgorithmConfig& algorithm = config.algorithm();
+  if (algorithm.target_critics() > algorithm.critics()) {
+    errors->push_back(absl::StrCat("algorithm.target_critics: expected at most algorithm.critics (",
+                                   algorithm.critics(), "), found ", algorithm.target_critics()));
+  }
+  if (algorithm.has_dbr()) CheckDbr(config, errors);
+}
+
+}  // namespace dbr
