@@ -57,6 +57,7 @@ def bullet_env(name):
         env_specs = {}
 
     gym = types.ModuleType("gym")
+    gym.__version__ = "0.21.0"
     gym.Env = gymnasium.Env
     gym.spaces = gymnasium.spaces
     gym.utils = types.ModuleType("gym.utils")
