@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <string>
 
+#include "core/symmetry.h"
+
 namespace dbr {
 
 enum class ActionKind { kDiscrete, kContinuous };
@@ -29,6 +31,7 @@ struct EnvSpec {
   ActionSpace actions;
   int max_episode_steps = 0;  // a longer episode is cut (truncation, not a terminal)
   bool has_score = false;     // episodes end with a score: 1 win, 0.5 draw, 0 loss
+  Symmetry symmetry = {};     // empty where there is none, or none is known
 
   bool operator==(const EnvSpec&) const = default;
 };

@@ -13,6 +13,7 @@
 #include "core/policy_snapshot.h"
 #include "core/safetensors.h"
 #include "core/space.h"
+#include "core/symmetry.h"
 #include "proto/config.pb.h"
 
 namespace dbr {
@@ -43,6 +44,7 @@ struct AlgorithmSpec {
   std::string env;
   int observation_size = 0;
   ActionSpace actions;
+  Symmetry symmetry;  // of the environment; empty where it has none
   std::vector<int> hidden_sizes;
   bool normalize_observations = false;
   bool bfloat16 = false;  // whether matrix products take bfloat16 and sum in float32

@@ -17,6 +17,7 @@
 #include "envs/env.h"
 #include "envs/registry/registry.h"
 #include "learner/algorithm.h"
+#include "learner/algorithms/mirrored.h"
 #include "learner/algorithms/registry.h"
 #include "nn/precision.h"
 #include "proto/config/config_file.h"
@@ -246,6 +247,7 @@ absl::StatusOr<EnvSpec> EnvSpecOf(const Config& config) {
 
 absl::Status CheckFits(const Config& config, const EnvSpec& env) {
   RETURN_IF_ERROR(CheckServes(config.algorithm(), env.name, env.actions));
+  RETURN_IF_ERROR(CheckMirror(config.algorithm(), env));
   RETURN_IF_ERROR(CheckExploration(env, config.actor()));
   const EvaluationConfig& evaluation = config.evaluation();
   RETURN_IF_ERROR(CheckMode(config, env, "actor.mode", config.actor().mode()));

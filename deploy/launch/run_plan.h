@@ -59,9 +59,9 @@ std::vector<ProcessSpec> Actors(const RunPlan& plan, const std::string& programs
 // The environment that a config names. InvalidArgument where there is none.
 absl::StatusOr<EnvSpec> EnvSpecOf(const Config& config);
 
-// InvalidArgument where the algorithm does not serve the actions of `env`, the way in which actors or the
-// evaluator choose actions is not for them, or an evaluation has too many episodes or an opponent that `env`
-// does not have.
+// InvalidArgument where the algorithm does not serve the actions of `env` or wants a symmetry that `env` does
+// not have, the way in which actors or the evaluator choose actions is not for them, or an evaluation has too
+// many episodes or an opponent that `env` does not have.
 absl::Status CheckFits(const Config& config, const EnvSpec& env);
 
 // How many actor processes a launch of `config` starts on this machine; 0: all training is offline.

@@ -75,4 +75,14 @@ void WriteObservation(const Board& board, absl::Span<float> observation, absl::S
   for (int column = 0; column < kColumns; ++column) mask[column] = static_cast<float>(legal >> column & 1);
 }
 
+Symmetry MirrorImage() {
+  Symmetry mirror;
+  for (int i = 0; i < kObservationSize; ++i) {
+    const int column = i % kColumns;
+    mirror.observation.push_back(i - column + kColumns - 1 - column);
+  }
+  for (int column = 0; column < kColumns; ++column) mirror.action.push_back(kColumns - 1 - column);
+  return mirror;
+}
+
 }  // namespace dbr::connect4

@@ -7,6 +7,7 @@
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
 #include "absl/types/span.h"
+#include "core/symmetry.h"
 
 namespace dbr::connect4 {
 
@@ -112,5 +113,8 @@ void WritePlanes(Cells own, Cells other, absl::Span<float> observation);
 // Writes what the side to move sees: its own stones in plane 0, the other side's in plane 1, and the mask
 // [kColumns] with 1 for each legal column and 0 elsewhere.
 void WriteObservation(const Board& board, absl::Span<float> observation, absl::Span<float> mask);
+
+// The board in a mirror: columns 0 to 6 become 6 to 0, in both planes, in the mask and as actions.
+Symmetry MirrorImage();
 
 }  // namespace dbr::connect4

@@ -41,7 +41,8 @@ Connect4Env::Connect4Env(std::vector<std::unique_ptr<Opponent>> opponents)
             .observation_size = kObservationSize,
             .actions = {ActionKind::kDiscrete, kColumns},
             .max_episode_steps = kCells / 2,
-            .has_score = true},
+            .has_score = true,
+            .symmetry = MirrorImage()},
       opponents_(std::move(opponents)) {}
 
 void Connect4Env::Reset(std::uint64_t seed, absl::Span<float> observation, absl::Span<float> mask) {

@@ -14,6 +14,7 @@
 #include "learner/algorithms/discrete_bear.h"
 #include "learner/algorithms/discrete_dbr.h"
 #include "learner/algorithms/discrete_sac.h"
+#include "learner/algorithms/mirrored.h"
 #include "learner/algorithms/normalized.h"
 #include "learner/algorithms/sac.h"
 #include "learner/algorithms/td3.h"
@@ -84,12 +85,18 @@ absl::Status CheckServes(const AlgorithmConfig& config, const std::string& env, 
 
 absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& spec) {
   RETURN_IF_ERROR(CheckServes(spec.config, spec.env, spec.actions));
+  RETURN_IF_ERROR(CheckMirror(spec.config, {.name = spec.env,
+                                            .observation_size = spec.observation_size,
+                                            .actions = spec.actions,
+                                            .symmetry = spec.symmetry}));
   const Entry* entry =
       std::find_if(std::begin(kAlgorithms), std::end(kAlgorithms), [&spec](const Entry& one) {
         return one.actions == spec.actions.kind && one.config_case == spec.config.algorithm_case();
       });
   std::unique_ptr<Algorithm> algorithm = entry->make(spec);
-  return spec.normalize_observations ? Normalized(spec, std::move(algorithm)) : std::move(algorithm);
+  if (spec.normalize_observations) algorithm = Normalized(spec, std::move(algorithm));
+  if (spec.config.mirror()) algorithm = Mirrored(spec, std::move(algorithm));
+  return algorithm;
 }
 
 }  // namespace dbr

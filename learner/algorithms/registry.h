@@ -13,7 +13,8 @@
 
 namespace dbr {
 
-// Makes the algorithm that spec.config names. Returns the errors of CheckServes.
+// Makes the algorithm that spec.config names. Returns the errors of CheckServes and CheckMirror
+// (learner/algorithms/mirrored.h).
 absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& spec);
 
 // Checks that the algorithm that `config` sets serves the environment's actions. Returns InvalidArgument

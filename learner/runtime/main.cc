@@ -52,6 +52,7 @@ absl::StatusOr<AlgorithmSpec> MakeSpec(const Config& config) {
   return AlgorithmSpec{.env = env->spec().name,
                        .observation_size = env->spec().observation_size,
                        .actions = env->spec().actions,
+                       .symmetry = env->spec().symmetry,
                        .hidden_sizes = HiddenSizes(config),
                        .normalize_observations = config.network().normalize_observations(),
                        .bfloat16 = bfloat16,

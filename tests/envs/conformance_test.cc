@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/symmetry.h"
 #include "envs/registry/registry.h"
 #include "gtest/gtest.h"
 
@@ -30,6 +31,8 @@ TEST_P(EnvConformance, TheSpecIsComplete) {
   EXPECT_GT(spec.observation_size, 0);
   EXPECT_GT(spec.actions.size, spec.actions.discrete() ? 1 : 0);
   EXPECT_GT(spec.max_episode_steps, 0);
+  const absl::Status symmetry = CheckSymmetry(spec.symmetry, spec.observation_size, spec.actions.size);
+  EXPECT_TRUE(symmetry.ok() || spec.symmetry.empty()) << symmetry;
   EXPECT_EQ(spec, World(GetParam()).spec());
 }
 

@@ -47,6 +47,13 @@ TEST(EnvRegistry, AnUnknownOpponentIsAnsweredWithTheKnownOnes) {
               AllOf(HasSubstr("\"mcts\""), HasSubstr("random, one_ply or mcts:N")));
 }
 
+TEST(EnvRegistry, TheBoardHasASymmetryAndTheRobotsHaveNone) {
+  for (const std::string& name : EnvNames()) {
+    EXPECT_EQ(MakeEnv({.name = name, .opponents = {}}).value()->spec().symmetry.empty(), name != "connect4")
+        << name;
+  }
+}
+
 TEST(EnvRegistry, PeopleAreToldOfAnEnvironmentByItsNameOrAlias) {
   EXPECT_EQ(PresentationOf("connect_four").episodes, "games");
   EXPECT_EQ(PresentationOf("hopper").episodes, "episodes");

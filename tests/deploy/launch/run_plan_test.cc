@@ -297,6 +297,15 @@ TEST_F(RunPlanTest, RefusesAnAlgorithmThatDoesNotServeTheActionsBeforeItMakesAFo
   EXPECT_FALSE(std::filesystem::exists(run_));
 }
 
+TEST_F(RunPlanTest, RefusesImagesWhereThereIsNoSymmetryBeforeItMakesAFolder) {
+  const auto plan = PrepareRun(Options({"env.name=hopper", "algorithm.mirror=true"}), kNow);
+  EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(plan.status().message()),
+              AllOf(HasSubstr("algorithm.mirror: expected false"), HasSubstr("'hopper' has no symmetry")));
+  EXPECT_FALSE(std::filesystem::exists(run_));
+  EXPECT_TRUE(PrepareRun(Options({"env.name=connect4", "algorithm.mirror=true"}), kNow).ok());
+}
+
 TEST(DefaultActorsTest, LeavesCoresToTheServices) {
   EXPECT_EQ(DefaultActors(1), 1);
   EXPECT_EQ(DefaultActors(2), 1);

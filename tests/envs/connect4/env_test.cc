@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/rng.h"
+#include "core/symmetry.h"
 #include "envs/connect4/board.h"
 #include "envs/env.h"
 #include "gmock/gmock.h"
@@ -90,6 +91,74 @@ TEST(Connect4Env, TheLastStepShowsTheFinalPositionAndItsOutcome) {
     ++outcomes[static_cast<int>(result.reward) + 1];
   }
   EXPECT_THAT(outcomes, Each(testing::Gt(0)));
+}
+
+// Follows an episode of the environment on a second board, on which all columns are mirrored.
+class MirroredGame {
+ public:
+  explicit MirroredGame(const World& world) : world_(world) {}
+
+  // Plays the stones that the world shows and the boards lack. The agent's come first.
+  void Follow() {
+    for (const int plane : {0, 1}) {
+      const Cells fresh = world_.Stones(plane) & ~board_.occupied();
+      if (fresh == 0) continue;
+      ASSERT_EQ(std::popcount(fresh), 1);
+      const int column = std::countr_zero(fresh) / kColumnStride;
+      board_.Play(column);
+      mirrored_.Play(kColumns - 1 - column);
+      agent_moved_last_ = plane == 0;
+    }
+  }
+
+  // What the environment would write for the mirrored board.
+  void Write(absl::Span<float> observation, absl::Span<float> mask) const {
+    const Cells agent = agent_moved_last_ ? mirrored_.other() : mirrored_.mover();
+    WriteObservation(mirrored_, observation, mask);
+    WritePlanes(agent, agent ^ mirrored_.occupied(), observation);
+  }
+  int reward() const { return !mirrored_.LastMoveWon() ? 0 : agent_moved_last_ ? 1 : -1; }
+  bool done() const { return mirrored_.IsOver(); }
+
+ private:
+  const World& world_;
+  Board board_, mirrored_;
+  bool agent_moved_last_ = false;
+};
+
+// The image of floats under a permutation.
+template <std::size_t n>
+std::array<float, n> Image(const std::vector<int>& places, const std::array<float, n>& floats) {
+  std::array<float, n> image;
+  for (std::size_t i = 0; i < n; ++i) image[static_cast<std::size_t>(places[i])] = floats[i];
+  return image;
+}
+
+TEST(Connect4Env, ItsSymmetryMapsEveryGameToTheMirroredGame) {
+  World world({"random", "one_ply"});
+  const Symmetry symmetry = world.env->spec().symmetry;
+  ASSERT_TRUE(CheckSymmetry(symmetry, kObservationSize, kColumns).ok());
+  Rng rng(8);
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    MirroredGame game(world);
+    world.Reset(seed);
+    StepResult result;
+    while (true) {
+      game.Follow();
+      std::array<float, kObservationSize> observation;
+      std::array<float, kColumns> mask;
+      game.Write(absl::MakeSpan(observation), absl::MakeSpan(mask));
+      ASSERT_EQ(Image(symmetry.observation, world.observation), observation) << seed;
+      ASSERT_EQ(Image(symmetry.action, world.mask), mask) << seed;
+      ASSERT_EQ(result.reward, game.reward());
+      ASSERT_EQ(result.done(), game.done());
+      if (result.done()) break;
+      int column = static_cast<int>(rng.Below(kColumns));
+      while (world.mask[column] == 0) column = (column + 1) % kColumns;
+      ASSERT_EQ(symmetry.action[column], kColumns - 1 - column);
+      result = world.Step(column);
+    }
+  }
 }
 
 TEST(Connect4Env, DrawsAnOpponentForEachEpisode) {

@@ -58,6 +58,11 @@ constexpr Variant kVariants[] = {
        dbr->set_entropy_weight(0.1);
      }},
     {"Normalized", "dbr", [](AlgorithmSpec* spec) { spec->normalize_observations = true; }},
+    {"Mirrored", "dbr",
+     [](AlgorithmSpec* spec) {
+       spec->config.set_mirror(true);
+       spec->symmetry = SmallSymmetry(spec->actions.kind);
+     }},
 };
 
 AlgorithmSpec SpecOf(const Member& member, std::uint64_t seed = 1) {

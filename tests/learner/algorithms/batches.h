@@ -19,6 +19,12 @@ inline AlgorithmSpec SmallSpec(std::uint64_t seed = 1, ActionKind actions = Acti
   return spec;
 }
 
+// A symmetry of the small problem, for either kind of action. Action 2 is its own image.
+inline Symmetry SmallSymmetry(ActionKind actions = ActionKind::kDiscrete) {
+  return {.observation = {1, 0, 2, 4, 3},
+          .action = actions == ActionKind::kDiscrete ? std::vector<int>{1, 0, 2} : std::vector<int>{1, 0}};
+}
+
 // Random transitions, with returns where the algorithm needs them. In a discrete space action 2 is illegal in
 // every third state.
 template <class Scalar>

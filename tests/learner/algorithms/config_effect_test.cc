@@ -194,6 +194,18 @@ TEST_P(ConfigEffect, ChangesWhatIsLearned) {
   EXPECT_TRUE(changes) << effect.algorithm << ": " << effect.value << " has no effect where " << effect.where;
 }
 
+TEST(ConfigEffectTest, ImagesUnderASymmetryChangeWhatIsLearned) {
+  for (const ActionKind actions : {ActionKind::kDiscrete, ActionKind::kContinuous}) {
+    AlgorithmSpec spec = SmallSpec(1, actions);
+    spec.symmetry = SmallSymmetry(actions);
+    const Networks base = Train(spec);
+    spec.config.set_mirror(true);
+    const Networks changed = Train(spec);
+    ASSERT_FALSE(base.empty() || changed.empty());
+    EXPECT_NE(base, changed);
+  }
+}
+
 std::string NameOf(const testing::TestParamInfo<Effect>& info) {
   std::string name = absl::StrCat(info.param.algorithm, "_", info.param.value);
   for (char& letter : name) {
