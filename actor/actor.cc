@@ -119,7 +119,8 @@ absl::Status Actor::Act() {
                                     .exploration = exploring,
                                     .discount = options_.config.algorithm().discount(),
                                     .with_returns = NeedsReturns(options_.config.algorithm()),
-                                    .reward_scale = options_.config.algorithm().reward_scale()};
+                                    .reward_scale = options_.config.algorithm().reward_scale(),
+                                    .n_step = static_cast<int>(options_.config.algorithm().n_step())};
   // An actor that restarts in the middle of a run must not repeat its first games.
   const Rng rng = ActorRng(options_).Fork(first->snapshot().version);
   StepLoop loop(std::move(envs_), stepping, rng,
@@ -129,10 +130,13 @@ absl::Status Actor::Act() {
                 });
   BrokenWorlds worlds;
   while (!stopping_.IsSet()) {
-    ASSIGN_OR_RETURN(const PolicySubscriber::PolicyPtr policy, subscriber_->Current());
-    RETURN_IF_ERROR(loop.Step(*policy));
+    const absl::StatusOr<PolicySubscriber::PolicyPtr> policy = subscriber_->Current();
+    if (stopping_.IsSet()) break;  // which closes the subscriber
+    RETURN_IF_ERROR(policy.status());
+    RETURN_IF_ERROR(loop.Step(**policy));
     worlds.Tell(loop.counters());
   }
+  RETURN_IF_ERROR(loop.Flush());
   if (loop.held_back() > 0) {
     spdlog::info("{} transitions of episodes that had not ended are dropped, for their returns are not known",
                  loop.held_back());

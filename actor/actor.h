@@ -41,7 +41,9 @@ class Actor {
 
   // Blocks until Stop(), and then returns OK, or until a final error of the policy, the environments or the
   // writer. In both cases it then blocks until everything that was written is acknowledged, or until
-  // drain_timeout has passed, and logs the counts.
+  // drain_timeout has passed, and logs the counts. Where algorithm.n_step is above 1, Stop() sends the last
+  // steps of unfinished episodes as transitions of fewer steps. They are dropped where the replay server
+  // takes no more, and after an error.
   absl::Status Run();
 
   void Stop();  // from any thread

@@ -2,21 +2,14 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "actor/transition_sink.h"
 #include "core/transition.h"
 
 namespace dbr {
-
-// Takes one transition, which is valid during the call. With it come its first advantage (kUnjudged where
-// there is none), the version of the critic that gave it, and the result of the episode where this transition
-// ended it.
-using TransitionSink =
-    std::function<absl::Status(const TransitionView& transition, float advantage,
-                               std::uint64_t critic_version, const std::optional<EpisodeEnd>& end)>;
 
 struct ReturnOptions {
   double reward_scale = 1;  // the critics learn the values of reward_scale * r

@@ -13,14 +13,21 @@ StepLoop::StepLoop(std::unique_ptr<VectorEnv> envs, const StepLoopOptions& optio
       options_(options),
       exploration_(envs_->spec().actions, options.exploration, envs_->size()),
       rng_(rng),
-      sink_(std::move(sink)),
+      n_step_(std::make_unique<NStepTransitions>(TransitionLayout::Of(envs_->spec(), options.with_returns),
+                                                 envs_->size(), options.n_step, std::move(sink))),
       actions_(MatrixX<float>::Zero(envs_->spec().actions.width(), envs_->size())),
       advantages_(VectorX<float>::Zero(envs_->size())),
       next_values_(VectorX<float>::Zero(envs_->size())),
       episodes_(envs_->size()) {
   if (options.with_returns) {
+    // Episodes come whole, one after another, so that they may all be steps of environment 0.
+    const auto add = [n_step = n_step_.get()](const TransitionView& step, float advantage,
+                                              std::uint64_t critic_version,
+                                              const std::optional<EpisodeEnd>& end) {
+      return n_step->Add(0, step, {advantage, critic_version}, end);
+    };
     returns_.emplace(TransitionLayout::Of(envs_->spec(), /*with_returns=*/true), envs_->size(),
-                     ReturnOptions{options.reward_scale, options.discount}, sink_);
+                     ReturnOptions{options.reward_scale, options.discount}, add);
   }
   for (int i = 0; i < envs_->size(); ++i) envs_->Reset(i, rng_());
 }
@@ -87,7 +94,7 @@ absl::Status StepLoop::Emit(int i, std::uint64_t critic_version) {
   if (returns_.has_value()) {
     RETURN_IF_ERROR(returns_->Add(i, transition, {advantages_[i], next_values_[i], critic_version}, end));
   } else {
-    RETURN_IF_ERROR(sink_(transition, advantages_[i], critic_version, end));
+    RETURN_IF_ERROR(n_step_->Add(i, transition, {advantages_[i], critic_version}, end));
   }
   ++counters_.transitions;
   if (end.has_value()) ++counters_.episodes;

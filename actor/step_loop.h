@@ -9,6 +9,8 @@
 #include "absl/status/status.h"
 #include "actor/episode_returns.h"
 #include "actor/exploration.h"
+#include "actor/n_step_transitions.h"
+#include "actor/transition_sink.h"
 #include "actor/vector_env.h"
 #include "core/rng.h"
 #include "core/transition.h"
@@ -25,10 +27,11 @@ struct StepLoopOptions {
   // as the first advantage.
   bool with_returns = false;
   double reward_scale = 1;  // the critics' reward scale, for that advantage
+  int n_step = 1;           // steps of a transition
 };
 
 struct StepCounters {
-  std::uint64_t transitions = 0;
+  std::uint64_t transitions = 0;  // one for each step, also where it is held back
   std::uint64_t episodes = 0;
   std::uint64_t explored = 0;  // actions replaced by random ones
   std::uint64_t broken = 0;    // episodes cut because their world failed
@@ -36,7 +39,8 @@ struct StepCounters {
 
 // All environments take one step at a time. Ended episodes restart with random seeds drawn from `rng`, so
 // that the same rng and policies give the same transitions. Rewards go out in the environment's units. With
-// returns, an episode's transitions go out together when it has ended (EpisodeReturns). Owns its
+// returns, an episode's transitions go out together when it has ended (EpisodeReturns). With n_step > 1 a
+// transition goes out n_step - 1 steps later, or when its episode has ended (NStepTransitions). Owns its
 // environments. One thread at a time.
 class StepLoop {
  public:
@@ -48,9 +52,14 @@ class StepLoop {
   // not be used again.
   absl::Status Step(const PolicyNetworks& policy);
 
+  // Lets go of the transitions that wait for further steps: they go out with fewer steps, and continue with
+  // the state that their environment is in. Those that wait for their returns stay. Blocks as the sink does
+  // and returns the sink's first error. Call it after the last step.
+  absl::Status Flush() { return n_step_->Flush(); }
+
   const StepCounters& counters() const { return counters_; }
-  // The number of transitions that are held back because their episodes have not ended.
-  std::uint64_t held_back() const { return returns_.has_value() ? returns_->held() : 0; }
+  // The number of transitions that are held back: until their episodes end, or until further steps.
+  std::uint64_t held_back() const { return n_step_->held() + (returns_.has_value() ? returns_->held() : 0); }
   const VectorEnv& envs() const { return *envs_; }
 
  private:
@@ -69,11 +78,11 @@ class StepLoop {
   const StepLoopOptions options_;
   Exploration exploration_;
   Rng rng_;
-  TransitionSink sink_;
+  const std::unique_ptr<NStepTransitions> n_step_;  // passes transitions on to the sink
   PolicyRunner runner_;
   MatrixX<float> actions_;                       // [action width x envs]
   VectorX<float> advantages_;                    // [envs]; with returns V(s)
-  std::optional<EpisodeReturns> returns_;        // with returns
+  std::optional<EpisodeReturns> returns_;        // with returns, before n_step_
   std::vector<int> cuts_;                        // environments whose episode the newest step cut
   MatrixX<float> cut_observations_, cut_masks_;  // [observation, mask width x cuts]
   VectorX<float> cut_values_;                    // [cuts]

@@ -96,6 +96,12 @@ absl::StatusOr<RunStore> OpenRunStore(const std::string& run) {
                      path, "; name the folder that dbr launch printed"));
   }
   ASSIGN_OR_RETURN(const Config config, LoadConfig(folder.config()));
+  if (config.algorithm().n_step() > 1) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--run: expected a run with algorithm.n_step: 1, found ", config.algorithm().n_step(), " in ",
+        folder.config(), ", whose store has the sums of several rewards. Name another run, or play its ",
+        "policy anew: --quality medium --policy ", run));
+  }
   EnvOptions env_options{.name = config.env().name(), .opponents = {}};
   env_options.opponents.assign(config.env().opponents().begin(), config.env().opponents().end());
   ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv(env_options));

@@ -35,7 +35,8 @@ struct RunStore {
 };
 
 // Opens the store of the run in that folder. NotFound where it is no run folder or has no store,
-// FailedPrecondition while the run goes on, and other errors of TransitionStore::Open.
+// InvalidArgument where its transitions are of more than one step (algorithm.n_step), FailedPrecondition
+// while the run goes on, and other errors of TransitionStore::Open.
 absl::StatusOr<RunStore> OpenRunStore(const std::string& run);
 
 }  // namespace dbr

@@ -38,9 +38,20 @@ constexpr char kDbrVariants[] =
     "constraint, divergence, advantage, repel_negative, value_penalty, munchausen_weight";
 constexpr char kBearSource[] = "Kumar et al. 2019";
 
+// The Munchausen term belongs to each reward. A transition of several steps has one sum of them, and the
+// actions of its later steps are not kept.
+absl::Status CheckDbr(const AlgorithmConfig& config, const std::string&) {
+  if (config.n_step() == 1 || config.dbr().munchausen_weight() == 0) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("algorithm.n_step: expected 1 with algorithm.dbr.munchausen_weight above 0, found ",
+                   config.n_step(), ". Set one of the two to its default."));
+}
+
 constexpr Entry kAlgorithms[] = {
-    {"dbr", AlgorithmConfig::kDbr, ActionKind::kDiscrete, MakeDiscreteDbr, kDbrSource, kDbrVariants},
-    {"dbr", AlgorithmConfig::kDbr, ActionKind::kContinuous, MakeContinuousDbr, kDbrSource, kDbrVariants},
+    {"dbr", AlgorithmConfig::kDbr, ActionKind::kDiscrete, MakeDiscreteDbr, kDbrSource, kDbrVariants,
+     CheckDbr},
+    {"dbr", AlgorithmConfig::kDbr, ActionKind::kContinuous, MakeContinuousDbr, kDbrSource, kDbrVariants,
+     CheckDbr},
     {"bear", AlgorithmConfig::kBear, ActionKind::kDiscrete, MakeDiscreteBear, kBearSource, "divergence"},
     {"bear", AlgorithmConfig::kBear, ActionKind::kContinuous, MakeContinuousBear, kBearSource, "divergence",
      CheckContinuousBear},

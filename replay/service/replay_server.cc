@@ -39,6 +39,7 @@ SeedBufferOptions SeedBufferOptionsFrom(const Config& config) {
           .layout = seed_buffer.layout(),
           .env = config.env().name(),
           .discount = static_cast<float>(config.algorithm().discount()),
+          .n_step = static_cast<int>(config.algorithm().n_step()),
           .evict = seed_buffer.evict(),
           .skip_bad_rows = seed_buffer.skip_bad_rows(),
           .min_rows = config.learner().offline_updates() > 0 ? config.replay().min_size() : 0,

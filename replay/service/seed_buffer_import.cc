@@ -9,6 +9,7 @@
 #include "core/monotonic_clock.h"
 #include "core/status_macros.h"
 #include "replay/dataset/dataset_reader.h"
+#include "replay/dataset/n_step_rows.h"
 #include "replay/dataset/return_reader.h"
 
 namespace dbr {
@@ -81,13 +82,16 @@ SeedBufferRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
           .actions_outside = static_cast<std::uint64_t>(facts.actions_outside)};
 }
 
-// The file's rows [n x stride], as the buffer lays them, with returns where it wants them.
+// The file's rows [n x stride], as the buffer lays them: with returns where it wants them, and of up to
+// options.n_step steps.
 class SeedBufferRows {
  public:
   // `reader` outlives this.
-  SeedBufferRows(DatasetReader* reader, const TransitionLayout& layout, float discount) : reader_(reader) {
+  SeedBufferRows(DatasetReader* reader, const TransitionLayout& layout, const SeedBufferOptions& options)
+      : reader_(reader), stride_(static_cast<std::size_t>(layout.stride())) {
+    if (options.n_step > 1) n_step_.emplace(layout, options.n_step);
     if (layout.return_width > 0) {
-      returns_.emplace(reader, discount);
+      returns_.emplace(reader, options.discount);
     } else {
       chunk_.emplace(layout, PartitionedBuffer::kSeedBufferRowsPerLock);
     }
@@ -95,15 +99,34 @@ class SeedBufferRows {
 
   // The next rows; none at the end. They are valid until the next call.
   absl::StatusOr<absl::Span<const float>> Next() {
+    if (!n_step_.has_value()) return NextSteps();
+    n_step_->Clear();
+    while (n_step_->rows().empty()) {
+      ASSIGN_OR_RETURN(const absl::Span<const float> steps, NextSteps());
+      for (std::size_t i = 0; i * stride_ < steps.size(); ++i) n_step_->Add(&steps[i * stride_], Starts(i));
+      if (!steps.empty()) continue;
+      n_step_->Finish();
+      break;
+    }
+    return n_step_->rows();
+  }
+
+ private:
+  // The next rows of one step each.
+  absl::StatusOr<absl::Span<const float>> NextSteps() {
     if (returns_.has_value()) return returns_->Next();
     RETURN_IF_ERROR(reader_->Next(&*chunk_).status());
     return chunk_->rows();
   }
 
- private:
+  // Whether row i of the newest NextSteps() does not follow the row before it.
+  bool Starts(std::size_t i) const { return returns_.has_value() ? i == 0 : chunk_->starts[i] != 0; }
+
   DatasetReader* const reader_;
+  const std::size_t stride_;  // floats
   std::optional<ReturnReader> returns_;
-  std::optional<TransitionChunk> chunk_;
+  std::optional<TransitionChunk> chunk_;  // without returns
+  std::optional<NStepRows> n_step_;       // where n_step > 1
 };
 
 }  // namespace
@@ -121,7 +144,7 @@ absl::StatusOr<SeedBufferRecord> ImportSeedBuffer(const SeedBufferOptions& optio
   const TransitionLayout& layout = buffer->layout();
   ASSIGN_OR_RETURN(const std::unique_ptr<DatasetReader> reader,
                    OpenFitting(options, layout, buffer->capacity()));
-  SeedBufferRows seed_buffer(reader.get(), layout, options.discount);
+  SeedBufferRows seed_buffer(reader.get(), layout, options);
   std::uint64_t held_already =
       before.seed_buffer_rows * static_cast<std::uint64_t>(layout.stride());  // floats
   for (;;) {

@@ -17,7 +17,8 @@ struct SeedBufferOptions {
   std::string path;            // HDF5 file, or folder of a Minari dataset; empty: none
   std::string layout;          // of replay/dataset/dataset_layout.h; empty: as the file's own attribute says
   std::string env;             // name of the environment that the data must come from
-  float discount = 0.99f;      // of transitions after which the task goes on
+  float discount = 0.99f;      // of a step after which the task goes on
+  int n_step = 1;              // steps of a transition, at least 1
   bool evict = false;          // let the seed buffer's rows make room as others do
   bool skip_bad_rows = false;  // else a bad row (replay/dataset/dataset_reader.h) is an error
   // Rows that the file must have at least; other than 0 where the first draw will wait for so many while
@@ -37,8 +38,9 @@ absl::Status CheckSeedBufferFits(const SeedBufferOptions& options, const Transit
 // import into the same store was broken off, and does nothing where the store has its seed buffer already.
 // Returns the record of the seed buffer. Where the buffer's rows have a return it is computed here; behind an
 // end that is cut or unfinished, the mean reward of the last min(T, 1 / (1 - discount)) steps is taken to go
-// on for ever (replay/dataset/return_reader.h). Errors: InvalidArgument for a seed buffer that does not fit
-// the capacity or the environment, Cancelled (what was read stays in the buffer), and all errors of
+// on for ever (replay/dataset/return_reader.h). With n_step > 1 the file's steps become as many transitions
+// of up to n_step steps (replay/dataset/n_step_rows.h). Errors: InvalidArgument for a seed buffer that does
+// not fit the capacity or the environment, Cancelled (what was read stays in the buffer), and all errors of
 // DatasetReader and PartitionedBuffer::InsertSeedBuffer. Blocks: it loads some 10^6 rows a second.
 absl::StatusOr<SeedBufferRecord> ImportSeedBuffer(const SeedBufferOptions& options,
                                                   PartitionedBuffer* buffer);

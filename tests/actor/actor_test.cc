@@ -1,10 +1,13 @@
 // Tests the actor with a real replay server and a double of the learner, over unix sockets.
 #include "actor/actor.h"
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <thread>
+#include <vector>
 
 #include "core/monotonic_clock.h"
 #include "gmock/gmock.h"
@@ -14,6 +17,7 @@
 #include "replay/service/replay_server.h"
 #include "tests/actor/learner_double.h"
 #include "tests/actor/line_env.h"
+#include "tests/actor/plain_n_step.h"
 #include "tests/actor/test_policies.h"
 
 namespace dbr {
@@ -258,6 +262,60 @@ TEST_F(ActorTest, ADrawnReturnIsThatOfItsEpisode) {
   }
   EXPECT_GT(compared, 800);
   EXPECT_GT(cut, 50);
+}
+
+// The game is the agent's own moves: a transition of several moves has the result where it reaches the end.
+TEST_F(ActorTest, TransitionsOfSeveralStepsArriveAsThePlainLoopMakesThem) {
+  constexpr std::size_t kCompared = 2000;
+  config_.mutable_algorithm()->set_discount(0.5);
+  const TransitionLayout layout = TransitionLayout::Of(Connect4Spec());
+  // The first rows in the store of an actor that makes transitions of `n` steps.
+  const auto rows_of = [&](std::uint32_t n) {
+    config_.mutable_algorithm()->set_n_step(n);
+    auto server = StartReplay(Connect4Spec());
+    LearnerDouble learner(learner_address_);
+    learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));
+    const auto actor = MakeActor();
+    RunningActor running(actor.get());
+    client_ = std::make_unique<ReplayClient>(replay_address_);
+    EXPECT_TRUE(AwaitInserted(3000));
+    EXPECT_TRUE(running.Stop([this] { MakeRoom(); }).ok());
+    const BufferStats stats = server->buffer().Stats();
+    ExpectEachOnce(stats, actor->counters().appended);
+    EXPECT_GT(stats.counters.episodes, 0u);
+    EXPECT_NEAR(stats.recent_return_mean, 2 * stats.recent_score_mean - 1, 1e-9);
+    server.reset();
+    const std::string path = folder_.path() + "/replay.store";
+    const auto store = TransitionStore::Open(
+        {.path = path, .env = "connect4", .layout = layout, .capacity = 50000, .resume = true});
+    EXPECT_TRUE(store.ok()) << store.status();
+    std::vector<std::vector<float>> rows;
+    for (std::uint32_t slot = 0; slot < (*store)->size(); ++slot)
+      rows.emplace_back((*store)->row(slot), (*store)->row(slot) + layout.stride());
+    std::filesystem::remove(path);
+    return rows;
+  };
+  const std::vector<std::vector<float>> single = rows_of(1), several = rows_of(3);
+  const auto ends = [&](std::size_t j) { return single[j][layout.discount_offset()] == 0; };
+  const std::vector<PlainNStep> plain = PlainNSteps(single.size(), 8, 3, ends);
+  ASSERT_GT(std::min(plain.size(), several.size()), kCompared);
+  int results = 0;
+  for (std::size_t i = 0; i < kCompared; ++i) {
+    const std::vector<float>& last = single[plain[i].steps.back()];
+    std::vector<float> expected = single[plain[i].steps.front()];
+    float reward = 0, discount = 1;  // exact, for the game has no reward before its end
+    for (const std::size_t j : plain[i].steps) {
+      reward += discount * single[j][layout.reward_offset()];
+      discount *= 0.5f;
+    }
+    expected[layout.reward_offset()] = reward;
+    expected[layout.discount_offset()] = ends(plain[i].steps.back()) ? 0 : discount;
+    std::copy(last.begin() + layout.next_observation_offset(), last.end(),
+              expected.begin() + layout.next_observation_offset());
+    ASSERT_EQ(several[i], expected) << "row " << i;
+    results += std::abs(reward) == 0.25f;
+  }
+  EXPECT_GT(results, 20);
 }
 
 TEST_F(ActorTest, GoesOnWhenTheLearnerAndTheReplayServerGoAwayAndComeBack) {

@@ -1,11 +1,13 @@
 #include "actor/step_loop.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/actor/line_env.h"
+#include "tests/actor/plain_n_step.h"
 #include "tests/actor/test_policies.h"
 
 namespace dbr {
@@ -198,6 +200,112 @@ TEST(StepLoopTest, WithReturnsEpisodesGoOutWholeAndBootstrapByTheCriticWhereThey
   EXPECT_EQ(first, seen.size());
   EXPECT_GT(terminated, 5);
   EXPECT_GT(cut, 5);
+}
+
+// Expects that two transitions are the same. The rewards' sums may differ in a float's last digit, where they
+// are made in another order.
+void ExpectSame(const Seen& actual, const Seen& expected) {
+  EXPECT_EQ(actual.observation, expected.observation);
+  EXPECT_EQ(actual.action, expected.action);
+  EXPECT_EQ(actual.mask, expected.mask);
+  EXPECT_EQ(actual.next_observation, expected.next_observation);
+  EXPECT_EQ(actual.next_mask, expected.next_mask);
+  EXPECT_FLOAT_EQ(actual.reward, expected.reward);
+  EXPECT_FLOAT_EQ(actual.discount, expected.discount);
+  EXPECT_FLOAT_EQ(actual.advantage, expected.advantage);
+  EXPECT_EQ(actual.critic_version, expected.critic_version);
+  ASSERT_EQ(actual.end.has_value(), expected.end.has_value());
+  if (!actual.end.has_value()) return;
+  EXPECT_EQ(actual.end->episode_return, expected.end->episode_return);
+  EXPECT_EQ(actual.end->length, expected.end->length);
+}
+
+// The steps of kEnvs environments as transitions of n steps, by a plain loop over each episode.
+std::vector<Seen> WithPlainLoop(const std::vector<Seen>& steps, int n, double discount) {
+  std::vector<Seen> transitions;
+  for (const PlainNStep& plain :
+       PlainNSteps(steps.size(), kEnvs, n, [&](std::size_t i) { return steps[i].end.has_value(); })) {
+    Seen transition = steps[plain.steps.front()];
+    const Seen& last = steps[plain.steps.back()];
+    double sum = 0, factor = 1;
+    for (const std::size_t i : plain.steps) {
+      sum += factor * steps[i].reward;
+      factor *= discount;
+    }
+    transition.reward = static_cast<float>(sum);
+    transition.discount = last.discount == 0 ? 0 : static_cast<float>(factor);
+    transition.next_observation = last.next_observation;
+    transition.next_mask = last.next_mask;
+    transitions.push_back(transition);
+  }
+  return transitions;
+}
+
+TEST(StepLoopTest, TransitionsOfSeveralStepsAreThePlainLoopsOverTheSingleSteps) {
+  const std::vector<Seen> steps = Walk({.discount = 0.8}, 1);
+  for (int n = 1; n <= 7; ++n) {
+    SCOPED_TRACE(n);
+    const std::vector<Seen> expected = WithPlainLoop(steps, n, 0.8);
+    std::vector<Seen> seen;
+    StepLoop loop(MakeLines(kEnvs), {.discount = 0.8, .n_step = n}, Rng(1), Into(&seen));
+    const auto policy = UntrainedPolicy(LineEnv().spec(), 5);
+    for (int step = 0; step < kSteps; ++step) ASSERT_TRUE(loop.Step(*policy).ok());
+    EXPECT_EQ(loop.counters().transitions, seen.size() + loop.held_back());
+    EXPECT_EQ(loop.held_back() > 0, n > 1) << "episodes are under way";
+    const std::size_t before = seen.size();
+    ASSERT_TRUE(loop.Flush().ok());
+    EXPECT_EQ(loop.held_back(), 0u);
+    ASSERT_EQ(seen.size(), expected.size());
+    ASSERT_EQ(seen.size(), steps.size()) << "as many as steps";
+    for (std::size_t i = 0; i < seen.size(); ++i) ExpectSame(seen[i], expected[i]);
+    for (std::size_t i = before; i < seen.size(); ++i) {
+      EXPECT_FALSE(seen[i].end.has_value());
+      EXPECT_GT(seen[i].discount, 0);
+    }
+  }
+}
+
+TEST(StepLoopTest, WithReturnsOfItsStartATransitionHasSeveralSteps) {
+  const auto walk = [](int n) {
+    std::vector<Seen> seen;
+    StepLoop loop(MakeLines(kEnvs), {.discount = 0.8, .with_returns = true, .n_step = n}, Rng(1),
+                  Into(&seen));
+    const auto policy = UntrainedPolicy(LineEnv().spec(), 5);
+    for (int step = 0; step < kSteps; ++step) EXPECT_TRUE(loop.Step(*policy).ok());
+    EXPECT_EQ(loop.counters().transitions, seen.size() + loop.held_back());
+    return seen;
+  };
+  const std::vector<Seen> single = walk(1), several = walk(3);
+  ASSERT_EQ(single.size(), several.size());
+  int whole = 0;
+  for (std::size_t first = 0, last = 0; first < single.size(); first = last + 1) {
+    for (last = first; !single[last].end.has_value();) ++last;
+    for (std::size_t t = first; t <= last; ++t) {
+      EXPECT_EQ(several[t].observation, single[t].observation);
+      EXPECT_EQ(several[t].monte_carlo_return, single[t].monte_carlo_return);
+      EXPECT_EQ(several[t].advantage, single[t].advantage);
+      EXPECT_EQ(several[t].end.has_value(), t == last);
+      const std::size_t end = std::min(t + 2, last);
+      EXPECT_EQ(several[t].next_observation, single[end].next_observation);
+      double sum = 0;
+      for (std::size_t k = t; k <= end; ++k) sum += std::pow(0.8, k - t) * single[k].reward;
+      EXPECT_FLOAT_EQ(several[t].reward, static_cast<float>(sum));
+      whole += end == t + 2;
+    }
+  }
+  EXPECT_GT(whole, 20);
+}
+
+TEST(StepLoopTest, FlushEndsWithTheErrorOfItsSink) {
+  int taken = 0;
+  StepLoop loop(MakeLines(kEnvs), {.n_step = 3}, Rng(9),
+                [&](const TransitionView&, float, std::uint64_t, const auto&) {
+                  return ++taken < 3 ? absl::OkStatus() : absl::CancelledError("closed");
+                });
+  ASSERT_TRUE(loop.Step(*UntrainedPolicy(LineEnv().spec(), 1)).ok());
+  EXPECT_EQ(taken, 0);
+  EXPECT_TRUE(absl::IsCancelled(loop.Flush()));
+  EXPECT_EQ(taken, 3);
 }
 
 TEST(StepLoopTest, WithoutCriticsTransitionsAreNotYetJudged) {

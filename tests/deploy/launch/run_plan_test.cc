@@ -136,16 +136,17 @@ TEST_F(RunPlanTest, RefusesToResumeAnotherRunAndNamesTheFields) {
   ASSERT_TRUE(PrepareRun(Options(), kNow).ok());
   MakeStore();
   const std::string before = *ReadFile(RunFolder{run_}.config());
-  const auto plan =
-      PrepareRun(Options({"replay.capacity=6000", "replay.byte_budget=100000000",
-                          "network.hidden_sizes=[64, 64]", "algorithm.dbr.epsilon=0.1", "seed=5"},
-                         true),
-                 kNow);
+  const auto plan = PrepareRun(
+      Options({"replay.capacity=6000", "replay.byte_budget=100000000", "network.hidden_sizes=[64, 64]",
+               "algorithm.dbr.epsilon=0.1", "seed=5", "algorithm.discount=0.9", "algorithm.n_step=3"},
+              true),
+      kNow);
   EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(
       std::string(plan.status().message()),
       AllOf(HasSubstr("replay.capacity: 5000 -> 6000"), HasSubstr("replay.byte_budget: 0 -> 100000000"),
-            HasSubstr("hidden_sizes"), HasSubstr("epsilon"), HasSubstr("seed: 1 -> 5")));
+            HasSubstr("hidden_sizes"), HasSubstr("epsilon"), HasSubstr("seed: 1 -> 5"),
+            HasSubstr("algorithm.discount: 0.99 -> 0.9"), HasSubstr("algorithm.n_step: 1 -> 3")));
   EXPECT_EQ(*ReadFile(RunFolder{run_}.config()), before);
 }
 
@@ -304,6 +305,14 @@ TEST_F(RunPlanTest, RefusesImagesWhereThereIsNoSymmetryBeforeItMakesAFolder) {
               AllOf(HasSubstr("algorithm.mirror: expected false"), HasSubstr("'hopper' has no symmetry")));
   EXPECT_FALSE(std::filesystem::exists(run_));
   EXPECT_TRUE(PrepareRun(Options({"env.name=connect4", "algorithm.mirror=true"}), kNow).ok());
+}
+
+TEST_F(RunPlanTest, RefusesTheMunchausenTermOverSeveralStepsBeforeItMakesAFolder) {
+  const auto plan = PrepareRun(Options({"algorithm.n_step=3", "algorithm.dbr.munchausen_weight=0.9"}), kNow);
+  EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(plan.status().message()), HasSubstr("algorithm.n_step: expected 1 with"));
+  EXPECT_FALSE(std::filesystem::exists(run_));
+  EXPECT_TRUE(PrepareRun(Options({"algorithm.n_step=3"}), kNow).ok());
 }
 
 TEST(DefaultActorsTest, LeavesCoresToTheServices) {

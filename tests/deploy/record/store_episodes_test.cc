@@ -121,5 +121,16 @@ TEST(OpenRunStoreTest, SaysWhatIsNoRun) {
   EXPECT_THAT(std::string(status.message()), HasSubstr("replay.store"));
 }
 
+TEST(OpenRunStoreTest, RefusesTransitionsOfSeveralSteps) {
+  const TempDir folder;
+  ASSERT_TRUE(
+      WriteFileAtomically(folder / "config.textproto", "env { name: \"hopper\" } algorithm { n_step: 3 }")
+          .ok());
+  ASSERT_TRUE(WriteFileAtomically(folder / "replay.store", "").ok());
+  const absl::Status status = OpenRunStore(folder.path()).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("expected a run with algorithm.n_step: 1, found 3"));
+}
+
 }  // namespace
 }  // namespace dbr

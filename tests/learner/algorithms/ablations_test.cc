@@ -256,6 +256,23 @@ TYPED_TEST(Ablations, EntropyRegularisesThePolicyWithoutAConstraint) {
   EXPECT_GT(entropy[1], entropy[0]);
 }
 
+// A transition of several steps has their rewards in one sum, to which the term of one action does not
+// belong.
+TEST(MunchausenTest, NeedsTransitionsOfOneStep) {
+  for (const ActionKind actions : {ActionKind::kDiscrete, ActionKind::kContinuous}) {
+    AlgorithmSpec spec = SmallSpec(1, actions);
+    spec.config.mutable_dbr();
+    spec.config.set_n_step(3);
+    EXPECT_TRUE(MakeAlgorithm(spec).ok());
+    spec.config.mutable_dbr()->set_munchausen_weight(0.9);
+    const absl::Status status = MakeAlgorithm(spec).status();
+    EXPECT_TRUE(absl::IsInvalidArgument(status)) << status;
+    EXPECT_THAT(std::string(status.message()), testing::HasSubstr("algorithm.n_step: expected 1 with"));
+    spec.config.set_n_step(1);
+    EXPECT_TRUE(MakeAlgorithm(spec).ok());
+  }
+}
+
 TEST(NormalizedSelfImitation, ReturnsReachTheAlgorithmBehindTheNormalizer) {
   AlgorithmSpec spec = SmallSpec();
   spec.config.mutable_dbr()->set_advantage(DbrConfig::SIL);

@@ -319,7 +319,10 @@ TEST(ReplayServerOptionsTest, TakesTheSeedFromTheConfig) {
   seed_buffer->set_share(0.25);
   seed_buffer->set_evict(true);
   seed_buffer->set_skip_bad_rows(true);
+  EXPECT_EQ(OptionsFrom(config, kLayout).seed_buffer.n_step, 1);
+  config.mutable_algorithm()->set_n_step(5);
   ReplayServerOptions options = OptionsFrom(config, kLayout);
+  EXPECT_EQ(options.seed_buffer.n_step, 5);
   EXPECT_EQ(options.seed_buffer.path, "some.hdf5");
   EXPECT_EQ(options.seed_buffer.layout, "minari");
   EXPECT_EQ(options.seed_buffer.env, "hopper");
