@@ -22,7 +22,7 @@ namespace dbr {
 //   2. pi minimises E[temperature * log pi(a|s) - min_i Q_i(s, a)], where a is drawn from pi and the gradient
 //      flows through the draw (equation 9).
 //   3. The temperature rises where the entropy is below its target and falls above it (equation 18).
-//   4. Polyak averaging of the critics.
+//   4. Polyak averaging of the critics, and of pi: evaluations play the average.
 //   5. A = Q(s, a) - V(s) for every transition of B. Q is the smaller twin before its step, and V is the
 //      smaller twin at the action that step 2 drew.
 template <class Scalar>
