@@ -61,6 +61,7 @@ EvaluationLoopOptions Evaluating(const ActorOptions& options, const std::string&
       .episodes = static_cast<int>(evaluation.episodes()),
       .seed = Rng(options.config.seed()).Fork(kEvaluatorStream)() >> 32,
       .mode = evaluation.mode(),
+      .which = evaluation.which(),
       .threads = 1,
       .every = absl::Seconds(evaluation.every_s()),
       .every_updates = evaluation.every_updates(),
@@ -201,8 +202,8 @@ EvaluatorProcess::EvaluatorProcess(const ActorOptions& options, const EnvSpec& e
            .report = [this](const EvaluationReport& report) { return Report(report); },
            .next_policy = [this](const PolicySubscriber::PolicyPtr& last,
                                  absl::Duration timeout) { return subscriber_.WaitForOther(last, timeout); },
-           .on_mean = [this](double mean, const PolicySnapshot& snapshot) { best_.Offer(mean, snapshot); }}) {
-}
+           .on_mean = [this](double mean, PolicyChoice played,
+                             const PolicySnapshot& snapshot) { best_.Offer(mean, played, snapshot); }}) {}
 
 absl::Status EvaluatorProcess::Run() {
   return loop_.Run();

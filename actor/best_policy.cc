@@ -13,12 +13,14 @@
 #include "core/policy_file.h"
 #include "core/safetensors.h"
 #include "core/status_macros.h"
+#include "nn/policy_choice.h"
 
 namespace dbr {
 namespace {
 
 constexpr char kMean[] = "evaluation.mean";
 constexpr char kMeasure[] = "evaluation.measure";
+constexpr char kPlayed[] = "evaluation.policy";
 
 std::string Metadata(const TensorFile& file, const std::string& key) {
   const auto found = file.metadata.find(key);
@@ -57,19 +59,20 @@ absl::Status BestPolicy::Read() {
   return absl::OkStatus();
 }
 
-void BestPolicy::Offer(double mean, const PolicySnapshot& snapshot) {
+void BestPolicy::Offer(double mean, PolicyChoice played, const PolicySnapshot& snapshot) {
   if (path_.empty() || !(mean > mean_)) return;
-  if (const absl::Status written = Write(mean, snapshot); !written.ok()) {
+  if (const absl::Status written = Write(mean, played, snapshot); !written.ok()) {
     spdlog::error("the best policy so far is not kept: {}", std::string(written.message()));
     return;
   }
   mean_ = mean;
 }
 
-absl::Status BestPolicy::Write(double mean, const PolicySnapshot& snapshot) const {
+absl::Status BestPolicy::Write(double mean, PolicyChoice played, const PolicySnapshot& snapshot) const {
   ASSIGN_OR_RETURN(TensorFile file, PolicyTensors(snapshot));
   file.metadata[kMean] = absl::StrFormat("%.17g", mean);
   file.metadata[kMeasure] = measure_;
+  file.metadata[kPlayed] = NameOf(played);
   std::error_code ignored;  // SaveTensors then reports the error
   // Not the folder of the run: where that has gone, it was moved, and a new one would split the run.
   std::filesystem::create_directory(std::filesystem::path(path_).parent_path(), ignored);

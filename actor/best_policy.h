@@ -6,12 +6,14 @@
 
 #include "absl/status/status.h"
 #include "core/policy_snapshot.h"
+#include "proto/config.pb.h"
 
 namespace dbr {
 
 // Keeps the best policy of a run over all of its evaluators: the file says how good its policy was, and an
 // evaluator that starts goes on from there. The figure is a mean over the opponents, of scores, else of
-// returns; the greater one is better. One thread at a time.
+// returns; the greater one is better. The network "policy" in the file is the one that earned the figure, be
+// it the raw policy of the learner or its average; the metadata say which. One thread at a time.
 class BestPolicy {
  public:
   // Reads the file at `path`, where there is one; an empty path keeps nothing. `measure` says in words what
@@ -19,16 +21,17 @@ class BestPolicy {
   // is no rival: the log says so, and the next policy takes its place.
   BestPolicy(std::string path, std::string measure);
 
-  // Writes the policy where `mean` is greater than any before. Creates the folder. An error, which is logged,
-  // leaves the file as it was, and a later policy is compared with that.
-  void Offer(double mean, const PolicySnapshot& snapshot);
+  // Writes the policy, as it played, where `mean` is greater than any before. `played` says which one it is.
+  // Creates the folder. An error, which is logged, leaves the file as it was, and a later policy is compared
+  // with that.
+  void Offer(double mean, PolicyChoice played, const PolicySnapshot& snapshot);
 
   // Of the policy in the file; -infinity where there is none.
   double mean() const { return mean_; }
 
  private:
   absl::Status Read();
-  absl::Status Write(double mean, const PolicySnapshot& snapshot) const;
+  absl::Status Write(double mean, PolicyChoice played, const PolicySnapshot& snapshot) const;
 
   const std::string path_;
   const std::string measure_;

@@ -98,7 +98,7 @@ absl::Status EvaluationLoop::RunByUpdates() {
     if (closing_) break;
     if (policy.ok()) {
       last = *std::move(policy);
-      const absl::Status status = EvaluateIfDue(*last);
+      const absl::Status status = EvaluateIfDue(last);
       if (closing_) break;
       RETURN_IF_ERROR(status);
     } else if (!absl::IsDeadlineExceeded(policy.status())) {
@@ -109,8 +109,8 @@ absl::Status EvaluationLoop::RunByUpdates() {
   return absl::OkStatus();
 }
 
-absl::Status EvaluationLoop::EvaluateIfDue(const PolicyNetworks& policy) {
-  const std::uint64_t iteration = policy.snapshot().updates / options_.every_updates;
+absl::Status EvaluationLoop::EvaluateIfDue(const PolicyPtr& policy) {
+  const std::uint64_t iteration = policy->snapshot().updates / options_.every_updates;
   if (last_iteration_.has_value() && iteration <= *last_iteration_) return absl::OkStatus();
   return EvaluateAll(policy, Reach(iteration));
 }
@@ -133,14 +133,15 @@ absl::Status EvaluationLoop::EvaluateIfNew() {
   if (policy == nullptr) return absl::OkStatus();
   if (evaluated_ != nullptr && policy->snapshot().version == evaluated_->snapshot().version)
     return absl::OkStatus();
-  RETURN_IF_ERROR(EvaluateAll(*policy, {}));
+  RETURN_IF_ERROR(EvaluateAll(policy, {}));
   evaluated_ = std::move(policy);
   return absl::OkStatus();
 }
 
 // Evaluates the policy against each opponent in turn.
-absl::Status EvaluationLoop::EvaluateAll(const PolicyNetworks& policy, const Iterations& iterations) {
-  const PolicySnapshot& snapshot = policy.snapshot();
+absl::Status EvaluationLoop::EvaluateAll(const PolicyPtr& policy, const Iterations& iterations) {
+  const PolicyPtr acting = WithActing(policy, options_.which);
+  const PolicySnapshot& snapshot = acting->snapshot();
   double sum = 0;
   for (const std::string& opponent : options_.opponents) {
     const EvaluationOptions evaluation = {.opponent = opponent,
@@ -148,7 +149,7 @@ absl::Status EvaluationLoop::EvaluateAll(const PolicyNetworks& policy, const Ite
                                           .seed = options_.seed + snapshot.version,
                                           .mode = options_.mode,
                                           .threads = options_.threads};
-    ASSIGN_OR_RETURN(const EvaluationResult result, Evaluate(policy, evaluation, &closing_));
+    ASSIGN_OR_RETURN(const EvaluationResult result, Evaluate(*acting, evaluation, &closing_));
     Log(result, snapshot);
     sum += std::isfinite(result.score_mean) ? result.score_mean : result.return_mean;
     unsent_.push_back(ReportOf(result, snapshot));
@@ -156,7 +157,8 @@ absl::Status EvaluationLoop::EvaluateAll(const PolicyNetworks& policy, const Ite
     unsent_.back().mutable_skipped_iterations()->Assign(iterations.skipped.begin(), iterations.skipped.end());
     if (unsent_.size() > kMaxUnsent) unsent_.pop_front();
     if (&opponent == &options_.opponents.back() && ports_.on_mean) {
-      ports_.on_mean(sum / static_cast<double>(options_.opponents.size()), snapshot);
+      ports_.on_mean(sum / static_cast<double>(options_.opponents.size()),
+                     ServedChoice(policy->snapshot(), options_.which), snapshot);
     }
     SendReports();
   }

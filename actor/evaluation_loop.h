@@ -18,6 +18,7 @@
 #include "actor/evaluator.h"
 #include "core/monotonic_clock.h"
 #include "nn/policy.h"
+#include "nn/policy_choice.h"
 #include "proto/policy.pb.h"
 
 namespace dbr {
@@ -27,6 +28,7 @@ struct EvaluationLoopOptions {
   int episodes = 200;                  // for each opponent
   std::uint64_t seed = 1;              // a random seed, to which the policy's version is added
   ActingMode mode = MODE;
+  PolicyChoice which = AVERAGE;  // the policy that plays; the raw one where there is no average
   int threads = 1;
   absl::Duration every = absl::Seconds(10);
   std::uint64_t every_updates = 0;  // above 0: evaluates by updates, in place of `every`
@@ -45,9 +47,9 @@ struct EvaluationLoopPorts {
   std::function<absl::StatusOr<std::shared_ptr<const PolicyNetworks>>(
       const std::shared_ptr<const PolicyNetworks>& last, absl::Duration timeout)>
       next_policy = nullptr;
-  // Receives each policy with its mean over the opponents (of scores, else of returns), before the last of
-  // its reports. May be null.
-  std::function<void(double mean, const PolicySnapshot&)> on_mean = nullptr;
+  // Receives each policy as it played (WithActing, nn/policy_choice.h), with its mean over the opponents (of
+  // scores, else of returns) and which one it is, before the last of its reports. May be null.
+  std::function<void(double mean, PolicyChoice played, const PolicySnapshot&)> on_mean = nullptr;
   std::function<absl::Time()> now = MonotonicNow;
   // Returns at the deadline, or at once after Close(). Null means waiting by the real clock.
   std::function<void(absl::Time)> wait_until = nullptr;
@@ -87,9 +89,9 @@ class EvaluationLoop {
   absl::Status RunByTime();
   absl::Status RunByUpdates();
   absl::Status EvaluateIfNew();
-  absl::Status EvaluateIfDue(const PolicyNetworks& policy);
+  absl::Status EvaluateIfDue(const std::shared_ptr<const PolicyNetworks>& policy);
   Iterations Reach(std::uint64_t iteration);
-  absl::Status EvaluateAll(const PolicyNetworks& policy, const Iterations& iterations);
+  absl::Status EvaluateAll(const std::shared_ptr<const PolicyNetworks>& policy, const Iterations& iterations);
   void SendReports();
 
   const EvaluationLoopOptions options_;

@@ -7,6 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "deploy/launch/played_policy.h"
 #include "nn/policy.h"
 
 namespace CLI {
@@ -26,14 +27,20 @@ inline constexpr char kRobotNames[] = "hopper|walker2d|half_cheetah|ant";
 
 // --policy FILE_OR_RUN, required.
 CLI::Option* AddPolicyOption(CLI::App* command, std::string* policy);
+// --which raw|average|best; `which` must be empty, which stands for what the run's config says.
+CLI::Option* AddWhichOption(CLI::App* command, std::string* which);
 // --mode; `text` says what it decides.
 CLI::Option* AddModeOption(CLI::App* command, const std::string& text, std::string* mode);
 // --seed N.
 CLI::Option* AddSeedOption(CLI::App* command, const std::string& text, std::uint64_t* seed);
 
 // The policy that --policy names: a file, a shipped file (FindShippedFile) or the newest one of a run folder.
-// NotFound, DataLoss or InvalidArgument, naming the file.
+// Its "policy" is the raw one. NotFound, DataLoss or InvalidArgument, naming the file.
 absl::StatusOr<std::shared_ptr<const PolicyNetworks>> OpenNamedPolicy(const std::string& name);
+
+// The policy that --policy and --which name together. The errors of OpenPlayedPolicy, and InvalidArgument for
+// any other `which` than raw, average, best (in any case) and the empty one.
+absl::StatusOr<PlayedPolicy> OpenNamedPolicy(const std::string& name, const std::string& which);
 
 // The mode that --mode names: sample, mode, greedy_q or support, in any case. InvalidArgument for any other.
 absl::StatusOr<ActingMode> ParseActingMode(const std::string& name);

@@ -200,7 +200,8 @@ void AddDatasetRecord(CLI::App* dataset, int* exit_code) {
       ->type_name(kWrittenLayoutNames);
   command
       ->add_option("--policy", flags->policy,
-                   "medium: a policy file or a run folder [deploy/policies/ENV_medium.safetensors]")
+                   "medium: a policy file or a run folder, of which the raw policy plays "
+                   "[deploy/policies/ENV_medium.safetensors]")
       ->type_name("FILE_OR_RUN");
   command->add_option("--run", flags->run, "mixed: the folder of the training run")->type_name("DIR");
   command->footer(

@@ -33,6 +33,7 @@ namespace {
 
 struct EvaluateFlags {
   std::string policy;
+  std::string which;
   std::string opponent;
   int episodes = 1000;
   std::uint64_t seed = 1;
@@ -79,7 +80,8 @@ absl::StatusOr<int> RunFilm(const EvaluateFlags& flags, const PolicyNetworks& po
 
 absl::StatusOr<int> RunEvaluate(const EvaluateFlags& flags) {
   ASSIGN_OR_RETURN(const ActingMode mode, ParseActingMode(flags.mode));
-  ASSIGN_OR_RETURN(const std::shared_ptr<const PolicyNetworks> policy, OpenNamedPolicy(flags.policy));
+  ASSIGN_OR_RETURN(const PlayedPolicy played, OpenNamedPolicy(flags.policy, flags.which));
+  const std::shared_ptr<const PolicyNetworks>& policy = played.networks;
   if (!flags.film.empty()) return RunFilm(flags, *policy, mode);
   std::vector<std::string> opponents = {flags.opponent};
   if (flags.opponent.empty()) opponents = OpponentsToEvaluate(policy->spec().env, {});
@@ -91,14 +93,17 @@ absl::StatusOr<int> RunEvaluate(const EvaluateFlags& flags) {
   if (absl::IsCancelled(results.status())) return kInterruptedExit;
   RETURN_IF_ERROR(results.status());
   if (flags.json) {
-    std::printf("%s\n", ToJson(results->front()).dump().c_str());
+    nlohmann::ordered_json json = ToJson(results->front());
+    json["policy"] = std::string(NameOf(played.choice));
+    std::printf("%s\n", json.dump().c_str());
     return 0;
   }
   const PolicySnapshot& snapshot = policy->snapshot();
-  std::printf("%s: %s on %s, policy %s after %s updates; seed %s, acting mode %s\n%s", flags.policy.c_str(),
-              snapshot.spec.algorithm.c_str(), snapshot.spec.env.c_str(),
-              WithCommas(snapshot.version).c_str(), WithCommas(snapshot.updates).c_str(),
-              absl::StrCat(flags.seed).c_str(), flags.mode.c_str(), ResultTable(*results).c_str());
+  std::printf("%s: %s on %s, policy %s (%s) after %s updates; seed %s, acting mode %s\n%s",
+              flags.policy.c_str(), snapshot.spec.algorithm.c_str(), snapshot.spec.env.c_str(),
+              WithCommas(snapshot.version).c_str(), std::string(NameOf(played.choice)).c_str(),
+              WithCommas(snapshot.updates).c_str(), absl::StrCat(flags.seed).c_str(), flags.mode.c_str(),
+              ResultTable(*results).c_str());
   return 0;
 }
 
@@ -110,6 +115,7 @@ void AddEvaluate(CLI::App* app, int* exit_code) {
       "evaluate",
       "Play episodes with a policy and print its mean score and return with their standard errors");
   AddPolicyOption(command, &flags->policy);
+  AddWhichOption(command, &flags->which);
   command
       ->add_option("--opponent", flags->opponent,
                    "The player that it meets [all that the environment has; with --json the first of them]")
@@ -123,7 +129,7 @@ void AddEvaluate(CLI::App* app, int* exit_code) {
   AddSeedOption(command, "Random seed: the same one plays the same games", &flags->seed);
   AddModeOption(command, "How the policy acts", &flags->mode);
   command->add_flag("--json", flags->json,
-                    "Print one JSON object: {env, opponent, episodes, seed, score, return}");
+                    "Print one JSON object: {env, opponent, episodes, seed, score, return, policy}");
   command
       ->add_option("--film", flags->film,
                    "Play one episode of a robot alone, and film it into this animated WebP file")
@@ -134,7 +140,7 @@ void AddEvaluate(CLI::App* app, int* exit_code) {
       "  dbr evaluate --policy runs/quickstart\n"
       "  dbr evaluate --policy runs/quickstart/policy/latest.safetensors --opponent mcts:10 --episodes 2000 "
       "--json\n"
-      "  dbr evaluate --policy runs/hopper --film hopper.webp");
+      "  dbr evaluate --policy runs/hopper --which best --film hopper.webp");
   command->callback([flags, exit_code] {
     const absl::StatusOr<int> result = RunEvaluate(*flags);
     *exit_code = result.ok() ? *result : Fail("evaluate", result.status());

@@ -20,6 +20,7 @@ namespace {
 
 struct ProbeFlags {
   std::string policy;
+  std::string which;
   std::string positions;
   std::optional<std::string> moves;
   std::string mode = "mode";
@@ -66,8 +67,9 @@ absl::Status RunProbe(const ProbeFlags& flags) {
     return absl::InvalidArgumentError("expected one of --positions FILE and --moves COLUMNS");
   }
   ASSIGN_OR_RETURN(const ActingMode mode, ParseActingMode(flags.mode));
-  ASSIGN_OR_RETURN(const std::shared_ptr<const PolicyNetworks> policy, OpenNamedPolicy(flags.policy));
-  return flags.moves.has_value() ? ProbeMoves(flags, *policy, mode) : ProbeFile(flags, *policy, mode);
+  ASSIGN_OR_RETURN(const PlayedPolicy policy, OpenNamedPolicy(flags.policy, flags.which));
+  return flags.moves.has_value() ? ProbeMoves(flags, *policy.networks, mode)
+                                 : ProbeFile(flags, *policy.networks, mode);
 }
 
 }  // namespace
@@ -77,6 +79,7 @@ void AddProbe(CLI::App* app, int* exit_code) {
   CLI::App* command =
       app->add_subcommand("probe", "Show what a Connect-4 policy thinks of positions, and how much is right");
   AddPolicyOption(command, &flags->policy);
+  AddWhichOption(command, &flags->which);
   command
       ->add_option("--positions", flags->positions,
                    "JSON file of positions with their exact values, as in tests/reference/connect4")

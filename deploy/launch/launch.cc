@@ -22,6 +22,7 @@
 #include "deploy/process/interrupt.h"
 #include "deploy/terminal/terminal.h"
 #include "envs/registry/registry.h"
+#include "nn/policy_choice.h"
 
 namespace dbr {
 namespace {
@@ -66,6 +67,7 @@ RunSummary BeginSummary(const RunPlan& plan) {
   summary.ended = RunEnding::kRunning;
   summary.failure.clear();
   summary.final_results.clear();
+  summary.final_policy.clear();
   ++summary.launches;
   return summary;
 }
@@ -317,11 +319,13 @@ absl::Status Launch::FinalEvaluation(bool* interrupted) {
     Say("no final table: the learner had no policy to save yet");
     return absl::OkStatus();
   }
-  ASSIGN_OR_RETURN(const auto policy, OpenPolicy(plan_.folder.latest_policy()));
+  ASSIGN_OR_RETURN(const auto newest, OpenPolicy(plan_.folder.latest_policy()));
   const EvaluationConfig& config = plan_.config.evaluation();
+  const PolicyChoice played = ServedChoice(newest->snapshot(), config.which());
+  const auto policy = WithActing(newest, played);
   const std::vector<std::string> opponents =
       OpponentsToEvaluate(summary().env, {config.final_opponents().begin(), config.final_opponents().end()});
-  Say(absl::StrCat("\nfinal evaluation of policy ", policy->snapshot().version, " (",
+  Say(absl::StrCat("\nfinal evaluation of policy ", policy->snapshot().version, ", ", NameOf(played), " (",
                    plan_.folder.latest_policy(), "):"));
   const Interrupt interrupt;
   absl::StatusOr<std::vector<EvaluationResult>> results =
@@ -334,7 +338,7 @@ absl::Status Launch::FinalEvaluation(bool* interrupted) {
   *interrupted = absl::IsCancelled(results.status());
   if (*interrupted) return absl::OkStatus();
   RETURN_IF_ERROR(results.status());
-  watch_.SetFinalResults(*std::move(results));
+  watch_.SetFinalResults(*std::move(results), NameOf(played));
   RETURN_IF_ERROR(SaveSummary());
   std::string table = ResultTable(summary().final_results);
   if (const std::string returns = ReturnsTable(summary()); !returns.empty())

@@ -114,6 +114,7 @@ absl::Status WriteSummary(const RunSummary& summary, const RunFolder& folder) {
                    {"restarts", summary.restarts},
                    {"evaluations", evaluations},
                    {"skipped_iterations", summary.SkippedIterations()},
+                   {"policy", summary.final_policy},
                    {"final", final_results}});
   if (summary.missed_evaluations > 0) json["missed_evaluations"] = summary.missed_evaluations;
   // Paths and logs may hold bytes that are not UTF-8.

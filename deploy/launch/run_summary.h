@@ -54,6 +54,7 @@ struct RunSummary {
   std::uint64_t missed_evaluations = 0;  // that the learner dropped before the launcher asked for them
   std::uint64_t every_updates = 0;       // between evaluations, as the config asks; 0: by time
   std::vector<EvaluationResult> final_results;
+  std::string final_policy;  // which one the final results are of: raw or average; empty until there are some
 
   // Takes over the counters of the newest answers, and returns the evaluations that are new.
   std::vector<EvaluationPoint> Update(const RunSample& sample);

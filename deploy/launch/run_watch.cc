@@ -67,8 +67,9 @@ void RunWatch::Fail(const absl::Status& why) {
   summary_.failure = std::string(why.message());
 }
 
-void RunWatch::SetFinalResults(std::vector<EvaluationResult> results) {
+void RunWatch::SetFinalResults(std::vector<EvaluationResult> results, std::string policy) {
   summary_.final_results = std::move(results);
+  summary_.final_policy = std::move(policy);
 }
 
 }  // namespace dbr

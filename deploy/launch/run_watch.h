@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -47,7 +48,8 @@ class RunWatch {
 
   void Interrupt() { summary_.ended = RunEnding::kInterrupted; }
   void Fail(const absl::Status& why);
-  void SetFinalResults(std::vector<EvaluationResult> results);
+  // `policy`: which one played, as summary.json names it.
+  void SetFinalResults(std::vector<EvaluationResult> results, std::string policy);
 
  private:
   const RunLimits limits_;

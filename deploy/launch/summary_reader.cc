@@ -154,6 +154,7 @@ absl::StatusOr<RunSummary> LoadSummary(const RunFolder& folder) {
     if (point.is_object()) points.push_back(ReadPoint(point));
   }
   summary.curve = EvaluationCurve(std::move(points), ReadSkipped(json));
+  summary.final_policy = Text(json, "policy");
   for (const Json& result : Part(json, "final")) {
     if (result.is_object()) summary.final_results.push_back(ReadResult(result));
   }

@@ -6,10 +6,11 @@
 #include "absl/strings/str_cat.h"
 #include "core/run_folder.h"
 #include "core/status_macros.h"
-#include "deploy/launch/run_access.h"
+#include "deploy/launch/played_policy.h"
 #include "deploy/probe/probe.h"
 #include "deploy/report/board_figure.h"
 #include "deploy/report/grid.h"
+#include "nn/policy_choice.h"
 
 namespace dbr::report {
 namespace {
@@ -58,8 +59,12 @@ std::vector<BoardAnswer> BoardAnswers(const Runs& runs, std::vector<std::string>
     if (!std::filesystem::exists(RunFolder{cell.folder}.latest_policy(), ignored)) continue;
     const std::string label =
         absl::StrCat(LabelOf(runs.grid.contender(cell.contender)), ", seed ", cell.seed);
-    const auto policy = OpenPolicy(cell.folder);
-    absl::StatusOr<BoardAnswer> answer = policy.ok() ? AskAboutBoard(**policy, label) : policy.status();
+    // The one that the final figures are of; before 0.2.0 there was no choice.
+    const auto choice =
+        cell.summary.final_policy == NameOf(AVERAGE) ? PlayedChoice::kAverage : PlayedChoice::kRaw;
+    const auto policy = OpenPlayedPolicy(cell.folder, choice);
+    absl::StatusOr<BoardAnswer> answer =
+        policy.ok() ? AskAboutBoard(*policy->networks, label) : policy.status();
     if (!answer.ok()) {
       notes->push_back(absl::StrCat("no bars beside the board for ", label, ": ", answer.status().message()));
       continue;

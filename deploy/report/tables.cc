@@ -74,14 +74,15 @@ std::vector<TableCell> CellLine(const Runs& runs, const ReportedCell& cell, bool
                                     runs.grid.contender(cell.contender).name(), absl::StrCat(cell.seed),
                                     NameOf(cell.state)};
   if (summary.ended == RunEnding::kNone) {
-    texts.resize(12, "–");
+    texts.resize(13, "–");
   } else {
     texts.insert(
         texts.end(),
         {std::string(TextOf(summary.ended)), summary.commit.empty() ? "–" : summary.commit.substr(0, 12),
          Clock(absl::Seconds(summary.wall_s)), WithCommas(summary.updates), WithCommas(summary.transitions),
          WithCommas(summary.games), cell.digest.empty() ? "–" : cell.digest,
-         summary.matrix_products.empty() ? "–" : summary.matrix_products});
+         summary.matrix_products.empty() ? "–" : summary.matrix_products,
+         summary.final_policy.empty() ? "–" : summary.final_policy});
   }
   std::vector<TableCell> line;
   for (std::string& text : texts) line.push_back({std::move(text)});
@@ -152,8 +153,8 @@ void AddCells(const Runs& runs, Document* document) {
   AddFailures(runs, document);
   Table table;
   table.fold = absl::StrCat("all ", runs.cells.size(), " cells");
-  table.header = {"task",         "contender", "seed",  "state", "ended",  "commit",
-                  "time (h:m:s)", "updates",   "steps", "games", "config", "matrix products"};
+  table.header = {"task",    "contender", "seed",  "state",  "ended",           "commit", "time (h:m:s)",
+                  "updates", "steps",     "games", "config", "matrix products", "policy"};
   int task = -1;
   for (const ReportedCell& cell : runs.cells) {
     table.rows.push_back(CellLine(runs, cell, cell.task != task));

@@ -18,7 +18,7 @@ Awac<Scalar>::Awac(const AlgorithmSpec& spec)
             {"train/advantage_mean"},
             {"train/advantage_positive"},
             {"train/advantage_std"}},
-           spec, /*policy_target=*/false) {}
+           spec) {}
 
 template <class Scalar>
 absl::Status Awac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicBatch<Scalar>&,

@@ -20,7 +20,7 @@ namespace dbr {
 //   2. y = r + discount * min_i Q'_i(s', a'), where a' is one draw from pi. Each critic regresses on y.
 //   3. pi maximises E[w log pi(a|s)] over B. The weight w = min(exp(A / temperature), max_weight) is a
 //      constant.
-//   4. Polyak averaging of the critics.
+//   4. Polyak averaging of the critics, and of pi: evaluations play the average.
 // Departures from the paper: A is taken before the critics' step. One forward pass at (s, a) then serves
 // both, and both sides of A come from the same critics. pi is a tanh-Gaussian, where theirs is a Gaussian.
 // While pi is trained, its log-std is clipped to [-5, 2], the limits of the behaviour policies: with the

@@ -16,7 +16,7 @@ namespace dbr {
 template <class Scalar>
 struct BearNetworks : ActorCritic<Scalar> {
   explicit BearNetworks(const AlgorithmSpec& spec)
-      : ActorCritic<Scalar>(spec, /*policy_target=*/true),
+      : ActorCritic<Scalar>(spec),
         multiplier(spec.config.bear().first_multiplier(), spec.config.bear().multiplier_learning_rate()) {}
 
   // Whether the warm start is over.

@@ -17,7 +17,7 @@ Brac<Scalar>::Brac(const AlgorithmSpec& spec)
             {"train/advantage_mean"},
             {"train/advantage_positive"},
             {"train/advantage_std"}},
-           spec, /*policy_target=*/true),
+           spec),
       behavior_(networks_.policy.shape(), networks_.Options(spec, /*with_target=*/false), networks_.rng),
       multiplier_(spec.config.brac().first_multiplier(), spec.config.brac().multiplier_learning_rate()) {}
 

@@ -19,7 +19,7 @@ namespace dbr {
 //   3. The temperature rises where the entropy is below its target and falls above it (equation 11). The
 //      target is target_entropy_ratio * log(number of legal actions) for each state. Both are averaged over
 //      B.
-//   4. Polyak averaging of the critics.
+//   4. Polyak averaging of the critics, and of pi: evaluations play the average.
 //   5. A = min_i Q_i(s, a) - sum_a pi(a|s) min_i Q_i(s, a) for every transition of B.
 // Departures from the paper: steps 2 and 5 use the critics' values from before step 1's gradient step, and
 // step 5 uses the policy from before step 2's, so that nothing is computed twice. Adam moves the log of the

@@ -26,7 +26,7 @@ struct FitLosses {
 template <class Scalar>
 struct DualBehaviorNetworks : ActorCritic<Scalar> {
   explicit DualBehaviorNetworks(const AlgorithmSpec& spec)
-      : ActorCritic<Scalar>(spec, /*policy_target=*/true),
+      : ActorCritic<Scalar>(spec),
         beta_plus(this->policy.shape(), this->Options(spec, /*with_target=*/false), this->rng),
         beta_minus(this->policy.shape(), this->Options(spec, /*with_target=*/false), this->rng),
         multiplier(spec.config.dbr().first_multiplier(), spec.config.dbr().multiplier_learning_rate(),

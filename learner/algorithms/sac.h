@@ -23,7 +23,7 @@ namespace dbr {
 //      flows through the draw (equation 9).
 //   3. The temperature rises where the entropy is below its target and falls above it (equation 18).
 //      Steps 2 and 3 are made in every updates_per_policy_update-th update.
-//   4. Polyak averaging of the critics.
+//   4. Polyak averaging of the critics, and of pi: evaluations play the average.
 //   5. A = Q(s, a) - V(s) for every transition of B. Q is the smaller twin before its step, and V is the
 //      smaller twin at an action drawn as in step 2.
 template <class Scalar>

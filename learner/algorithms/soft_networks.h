@@ -18,7 +18,7 @@ struct SoftNetworks : ActorCritic<Scalar> {
   // `config` is the spec's SacConfig or DiscreteSacConfig.
   template <class TemperatureConfig>
   SoftNetworks(const AlgorithmSpec& spec, const TemperatureConfig& config)
-      : ActorCritic<Scalar>(spec, /*policy_target=*/false),
+      : ActorCritic<Scalar>(spec),
         temperature(config.first_temperature(), config.temperature_learning_rate(), kTemperatureLimits) {}
 
   // Ends an update: one step of the temperature, where the update improved the policy. The temperature rises

@@ -14,7 +14,7 @@ Td3<Scalar>::Td3(const AlgorithmSpec& spec)
             {"train/advantage_mean"},
             {"train/advantage_positive"},
             {"train/advantage_std"}},
-           spec, /*policy_target=*/true) {
+           spec) {
   VectorX<Scalar> parameters = networks_.policy.parameters();
   PinLogStd(networks_.policy.shape(), &parameters);
   networks_.policy.SetParameters(parameters);

@@ -1,6 +1,6 @@
-// What every actor-critic trains and keeps, with any loss: a policy, critics, a random generator, a
-// counter, and the advantages of the newest update. An algorithm holds one of these, or a struct that derives
-// from it and adds networks.
+// What every actor-critic trains and keeps, with any loss: a policy with its Polyak average, critics, a random
+// generator, a counter, and the advantages of the newest update. An algorithm holds one of these, or a struct
+// that derives from it and adds networks.
 #pragma once
 
 #include <cstdint>
@@ -24,11 +24,11 @@ namespace dbr {
 // The algorithm owns it. One thread at a time, except for functions that `runner` runs side by side.
 template <class Scalar>
 struct ActorCritic {
-  ActorCritic(const AlgorithmSpec& algorithm_spec, bool policy_target)
+  explicit ActorCritic(const AlgorithmSpec& algorithm_spec)
       : spec(algorithm_spec),
         rng(spec.seed),
         runner(UpdateThreads(spec.config)),
-        policy(PolicyShape(PolicySpecOf(spec)), Options(spec, policy_target), rng),
+        policy(PolicyShape(PolicySpecOf(spec)), Options(spec, /*with_target=*/true), rng),
         critics(CriticShape(PolicySpecOf(spec)), Options(spec, /*with_target=*/true), rng, &runner,
                 {.critics = static_cast<int>(spec.config.critics()),
                  .asked = static_cast<int>(spec.config.target_critics())}) {}
@@ -44,8 +44,8 @@ struct ActorCritic {
   BatchNeeds needs() const { return {.uniform = static_cast<int>(spec.config.batch_size())}; }
 
   // Draws the twins of this update. Sets its learning rate, and whether its steps move the targets of the
-  // critics and, where it has one, of the policy. Returns the learning rate, for networks that are not in
-  // this struct.
+  // critics and of the policy. The policy's target is the average that a snapshot exports; some algorithms
+  // read it in the critics' targets too. Returns the learning rate, for networks that are not in this struct.
   double Begin(bool move_targets = true) {
     const double learning_rate = LearningRate(spec.config, updates);
     const double tau = move_targets ? spec.config.target_tau() : 0;
@@ -64,10 +64,12 @@ struct ActorCritic {
     Eigen::Map<Eigen::VectorXf>(advantages.data(), advantage.size()) = advantage.template cast<float>();
   }
 
-  // Starts a snapshot with the policy and the two critics. An algorithm then adds its own networks.
+  // Starts a snapshot with the policy, its average and the two critics. An algorithm then adds its own
+  // networks.
   void Export(PolicySnapshot* snapshot) const {
     BeginExport(spec, snapshot);
     ExportNetwork(kPolicyNetwork, policy.parameters(), snapshot);
+    ExportNetwork(kPolicyAverage, policy.target(), snapshot);
     ExportNetwork(kCritic1, critics.first().parameters(), snapshot);
     ExportNetwork(kCritic2, critics.second().parameters(), snapshot);
   }
@@ -79,9 +81,9 @@ struct ActorCritic {
     PutCounter(AlgorithmName(spec.config) + ".updates", updates, file);
   }
   // Returns DataLoss where a tensor or counter is missing and InvalidArgument where a tensor has another
-  // size.
+  // size. Programs before 0.2.0 kept no average of some policies: it then starts from the loaded policy.
   absl::Status Load(const TensorFile& file) {
-    absl::Status status = policy.Load(kPolicyNetwork, file);
+    absl::Status status = policy.LoadOrStartTarget(kPolicyNetwork, file);
     status.Update(critics.Load(file));
     status.Update(GetRng(AlgorithmName(spec.config) + ".rng", file, &rng));
     status.Update(GetCounter(AlgorithmName(spec.config) + ".updates", file, &updates));

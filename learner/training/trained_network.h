@@ -126,15 +126,12 @@ class TrainedNetwork {
   // Returns DataLoss where a tensor or counter is missing and InvalidArgument where a tensor has another
   // size.
   absl::Status Load(const std::string& name, const TensorFile& file) {
-    absl::Status status;
-    Visit(name, [&](const std::string& key, VectorX<Scalar>& values) {
-      status.Update(GetTensor(key, file, &values));
-    });
-    std::uint64_t steps = 0;
-    status.Update(GetCounter(name + ".adam.steps", file, &steps));
-    adam_.set_steps(steps);
-    RoundAll();
-    return status;
+    return LoadParts(name, file, /*starts_target=*/false);
+  }
+  // As Load, but takes a file without the target: the target then starts from the online network. Requires a
+  // target.
+  absl::Status LoadOrStartTarget(const std::string& name, const TensorFile& file) {
+    return LoadParts(name, file, /*starts_target=*/file.tensors.count(TargetName(name)) == 0);
   }
 
  private:
@@ -159,10 +156,25 @@ class TrainedNetwork {
     }
   }
 
+  absl::Status LoadParts(const std::string& name, const TensorFile& file, bool starts_target) {
+    absl::Status status;
+    Visit(name, [&](const std::string& key, VectorX<Scalar>& values) {
+      if (starts_target && &values == &target_) return;
+      status.Update(GetTensor(key, file, &values));
+    });
+    std::uint64_t steps = 0;
+    status.Update(GetCounter(name + ".adam.steps", file, &steps));
+    adam_.set_steps(steps);
+    if (starts_target) target_ = parameters_;
+    RoundAll();
+    return status;
+  }
+
+  static std::string TargetName(const std::string& name) { return name + ".target"; }
   template <class Function>
   void Visit(const std::string& name, const Function& function) {
     function(name, parameters_);
-    if (target_.size() > 0) function(name + ".target", target_);
+    if (target_.size() > 0) function(TargetName(name), target_);
     function(name + ".adam.first", adam_.first_moment());
     function(name + ".adam.second", adam_.second_moment());
   }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "actor/evaluation_loop.h"
@@ -23,7 +24,7 @@ class BestPolicyTest : public ::testing::Test {
  protected:
   // Offers a policy as an evaluator of its own would, which has just started.
   void OfferAfterAStart(double mean, std::uint64_t version, const std::string& measure = kMeasure) {
-    BestPolicy(path_, measure).Offer(mean, UntrainedSnapshot(Connect4Spec(), version));
+    BestPolicy(path_, measure).Offer(mean, RAW, UntrainedSnapshot(Connect4Spec(), version));
   }
   // The version in the file; 0 where there is none.
   std::uint64_t Kept() const {
@@ -40,11 +41,22 @@ TEST_F(BestPolicyTest, KeepsEachPolicyThatIsBetterThanAllBeforeIt) {
   std::uint64_t version = 0;
   std::vector<std::uint64_t> kept;
   for (const double mean : {-0.5, -0.6, -0.5, 0.25, 0.0, static_cast<double>(NAN), 0.5}) {
-    best.Offer(mean, UntrainedSnapshot(Connect4Spec(), ++version));
+    best.Offer(mean, RAW, UntrainedSnapshot(Connect4Spec(), ++version));
     kept.push_back(Kept());
   }
   EXPECT_THAT(kept, ::testing::ElementsAre(1, 1, 1, 4, 4, 4, 7));
   EXPECT_EQ(best.mean(), 0.5);
+}
+
+TEST_F(BestPolicyTest, TheFileSaysWhichPolicyEarnedItsFigure) {
+  BestPolicy best(path_, kMeasure);
+  double mean = 0;
+  for (const auto& [played, name] : {std::pair(AVERAGE, "average"), std::pair(RAW, "raw")}) {
+    const PolicySnapshot snapshot = UntrainedSnapshot(Connect4Spec(), 1);
+    best.Offer(++mean, played, snapshot);
+    EXPECT_EQ(LoadTensors(path_)->metadata["evaluation.policy"], name);
+    EXPECT_EQ(LoadPolicy(path_)->networks, snapshot.networks);
+  }
 }
 
 TEST_F(BestPolicyTest, AnEvaluatorThatStartsAgainDoesNotReplaceItByAWorseOne) {
@@ -89,15 +101,15 @@ TEST_F(BestPolicyTest, WhatCannotBeWrittenIsComparedAgain) {
   const std::string blocked = folder_ / "policy";
   ASSERT_TRUE(WriteFileAtomically(blocked, "a file in the place of the folder").ok());
   BestPolicy best(path_, kMeasure);
-  best.Offer(0.9, UntrainedSnapshot(Connect4Spec(), 1));
+  best.Offer(0.9, RAW, UntrainedSnapshot(Connect4Spec(), 1));
   ASSERT_TRUE(std::filesystem::remove(blocked));
-  best.Offer(0.5, UntrainedSnapshot(Connect4Spec(), 2));
+  best.Offer(0.5, RAW, UntrainedSnapshot(Connect4Spec(), 2));
   EXPECT_EQ(Kept(), 2u);
 }
 
 TEST_F(BestPolicyTest, WithoutAFileNothingIsKept) {
   BestPolicy best("", kMeasure);
-  best.Offer(1, UntrainedSnapshot(Connect4Spec(), 1));
+  best.Offer(1, RAW, UntrainedSnapshot(Connect4Spec(), 1));
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 

@@ -17,6 +17,7 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using ::testing::Pair;
 using PolicyPtr = std::shared_ptr<const PolicyNetworks>;
+using Networks = std::vector<std::pair<std::string, std::vector<float>>>;
 
 // Runs the loop with a clock of its own. Each wait moves the time to the deadline and then plays the next
 // entry of the script.
@@ -28,19 +29,21 @@ class EvaluationLoopTest : public ::testing::Test {
   explicit EvaluationLoopTest(const EvaluationLoopOptions& options) : loop_(options, Ports()) {}
 
   EvaluationLoopPorts Ports() {
-    return {
-        .newest_policy = [this] { return newest_; },
-        .report = [this](const EvaluationReport& report) { return Report(report); },
-        .next_policy = [this](const auto& last, absl::Duration) { return NextPolicy(last); },
-        .on_mean = [this](double mean,
-                          const PolicySnapshot& snapshot) { means_.emplace_back(snapshot.version, mean); },
-        .now = [this] { return now_; },
-        .wait_until =
-            [this](absl::Time deadline) {
-              waits_.push_back(deadline - now_);
-              now_ = std::max(now_, deadline);
-              PlayNext();
-            }};
+    return {.newest_policy = [this] { return newest_; },
+            .report = [this](const EvaluationReport& report) { return Report(report); },
+            .next_policy = [this](const auto& last, absl::Duration) { return NextPolicy(last); },
+            .on_mean =
+                [this](double mean, PolicyChoice played, const PolicySnapshot& snapshot) {
+                  means_.emplace_back(snapshot.version, mean);
+                  played_.emplace_back(played, snapshot.networks);
+                },
+            .now = [this] { return now_; },
+            .wait_until =
+                [this](absl::Time deadline) {
+                  waits_.push_back(deadline - now_);
+                  now_ = std::max(now_, deadline);
+                  PlayNext();
+                }};
   }
 
   // Plays the script's next entry and returns its result: a policy, an error, or nothing new before the
@@ -80,7 +83,8 @@ class EvaluationLoopTest : public ::testing::Test {
   std::vector<EvaluationReport> whole_reports_;
   std::map<std::uint64_t, double> scores_;               // by version, summed over the opponents
   std::vector<std::pair<std::uint64_t, double>> means_;  // of each version
-  std::vector<std::size_t> means_at_report_;             // how many there were before each report
+  std::vector<std::pair<PolicyChoice, Networks>> played_;
+  std::vector<std::size_t> means_at_report_;  // how many there were before each report
   std::vector<absl::Duration> waits_;
   std::deque<std::function<void()>> script_;
   EvaluationLoop loop_;
@@ -150,6 +154,50 @@ TEST_F(EvaluationLoopTest, EndsWithTheErrorOfItsPolicies) {
   newest_ = absl::InvalidArgumentError("another environment");
   EXPECT_TRUE(absl::IsInvalidArgument(loop_.Run()));
 }
+
+class EvaluatedChoiceTest : public EvaluationLoopTest, public ::testing::WithParamInterface<PolicyChoice> {
+ protected:
+  EvaluatedChoiceTest()
+      : EvaluationLoopTest({.opponents = {"random", "one_ply"},
+                            .episodes = 50,
+                            .seed = 1,
+                            .which = GetParam(),
+                            .every = absl::Seconds(10)}) {}
+
+  // The mean return of a policy in the games that the loop plays with version 3.
+  static double MeanOf(const PolicySnapshot& snapshot, const std::string& opponent) {
+    const PolicyPtr policy = PolicyNetworks::Create(snapshot).value();
+    return Evaluate(*policy, {.opponent = opponent, .episodes = 50, .seed = 1 + 3})->return_mean;
+  }
+};
+
+TEST_P(EvaluatedChoiceTest, PlaysTheChosenPolicy) {
+  const PolicySnapshot raw = UntrainedSnapshot(Connect4Spec(), 3);
+  const PolicySnapshot average = UntrainedSnapshot(Connect4Spec(), 4);
+  newest_ = PolicyNetworks::Create(WithAverage(raw, average)).value();
+  ASSERT_TRUE(loop_.Run().ok());
+  ASSERT_EQ(whole_reports_.size(), 2u);
+  for (const EvaluationReport& report : whole_reports_) {
+    const double of_raw = MeanOf(raw, report.opponent()), of_average = MeanOf(average, report.opponent());
+    ASSERT_NE(of_raw, of_average) << "the test needs two policies that play differently";
+    EXPECT_EQ(report.return_mean(), GetParam() == AVERAGE ? of_average : of_raw);
+    EXPECT_EQ(report.policy_version(), 3u);
+  }
+  Networks expected = raw.networks;
+  if (GetParam() == AVERAGE) expected[0] = average.networks[0];
+  EXPECT_THAT(played_, ElementsAre(Pair(GetParam(), expected)));
+}
+
+TEST_P(EvaluatedChoiceTest, WithoutAnAverageTheRawPolicyPlays) {
+  const PolicySnapshot raw = UntrainedSnapshot(Connect4Spec(), 3);
+  newest_ = PolicyNetworks::Create(raw).value();
+  ASSERT_TRUE(loop_.Run().ok());
+  EXPECT_EQ(whole_reports_[0].return_mean(), MeanOf(raw, "random"));
+  EXPECT_THAT(played_, ElementsAre(Pair(RAW, raw.networks)));
+}
+
+INSTANTIATE_TEST_SUITE_P(Choices, EvaluatedChoiceTest, ::testing::Values(RAW, AVERAGE),
+                         [](const auto& info) { return PolicyChoice_Name(info.param); });
 
 // Version v has 10 v updates, so it belongs to iteration v / 2.
 class EvaluationByUpdatesTest : public EvaluationLoopTest {

@@ -6,13 +6,17 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <filesystem>
 #include <fstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
 #include "core/check.h"
 #include "core/monotonic_clock.h"
+#include "core/safetensors.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/actor/learner_double.h"
@@ -213,6 +217,30 @@ TEST_F(ProgramTest, EvaluatorReportsToTheLearnerUntilItIsStopped) {
     EXPECT_NEAR(report.return_mean(), 2 * report.score_mean() - 1, 1e-12);
     EXPECT_GE(report.score_stderr(), 0);
   }
+}
+
+TEST_F(ProgramTest, EvaluatorPlaysTheAverageUnlessTheConfigSaysRaw) {
+  const std::string evaluation = "episodes: 50 every_s: 1000000 opponents: 'random'";
+  const PolicySnapshot raw = UntrainedSnapshot(Connect4Spec(), 3);
+  const PolicySnapshot both = WithAverage(raw, UntrainedSnapshot(Connect4Spec(), 4));
+  const std::string best = folder_.path() + "/policy/best.safetensors";
+  // The mean return, and which policy the best file says.
+  const auto evaluate = [&](const PolicySnapshot& snapshot, const std::string& which) {
+    std::filesystem::remove(best);
+    LearnerDouble learner(folder_.Address("learner"));
+    learner.Offer(Encode(snapshot));
+    Program evaluator(EvaluatorFlags(absl::StrCat(kSmall, " evaluation { ", evaluation, which, " }")));
+    EXPECT_TRUE(learner.AwaitReports(1, kLong));
+    evaluator.Signal(SIGTERM);
+    EXPECT_EQ(evaluator.Wait(), 0) << evaluator.output();
+    return std::pair(learner.reports()[0].return_mean(), LoadTensors(best)->metadata["evaluation.policy"]);
+  };
+  const auto alone = evaluate(raw, "");
+  EXPECT_EQ(alone.second, "raw");
+  EXPECT_EQ(evaluate(both, " which: RAW"), alone);
+  const auto average = evaluate(both, "");
+  EXPECT_NE(average.first, alone.first);
+  EXPECT_EQ(average.second, "average");
 }
 
 TEST_F(ProgramTest, EvaluatorByUpdatesWakesForANewPolicyAndNamesWhatItSkips) {

@@ -40,6 +40,12 @@ inline std::shared_ptr<const PolicyNetworks> UntrainedPolicy(const EnvSpec& env,
   return PolicyNetworks::Create(UntrainedSnapshot(env, version, with_critics)).value();
 }
 
+// Returns `raw` with an average, which is the policy of `average`.
+inline PolicySnapshot WithAverage(PolicySnapshot raw, const PolicySnapshot& average) {
+  raw.networks.emplace_back(kPolicyAverage, *average.Find(kPolicyNetwork));
+  return raw;
+}
+
 inline EnvSpec Connect4Spec() {
   return MakeEnv({.name = "connect4", .opponents = {}}).value()->spec();
 }

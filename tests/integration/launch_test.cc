@@ -65,6 +65,7 @@ void ExpectPolicyCommandsWork(const RunFolder& run) {
   EXPECT_EQ(result["opponent"], "random");
   EXPECT_EQ(result["episodes"], 400);
   EXPECT_EQ(result["seed"], 7);
+  EXPECT_EQ(result["policy"], "average");
   EXPECT_GT(result["score"]["mean"], 0.75);
   EXPECT_GT(result["return"]["mean"], 0.5);
   EXPECT_GT(result["score"]["stderr"], 0);
@@ -91,6 +92,7 @@ TEST_F(LaunchTest, LearnsToBeatRandomAndGoesOnWhereItStopped) {
   ExpectWholeRunFolder(run_);
   const Json first = Summary(run_);
   EXPECT_EQ(first["ended"], "max_updates");
+  EXPECT_EQ(first["policy"], "average");
   EXPECT_EQ(first["seed"], 2);
   EXPECT_EQ(first["restarts"], 0);
   EXPECT_GE(first["updates"], 2500);

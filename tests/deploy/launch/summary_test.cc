@@ -33,6 +33,7 @@ TEST(SummaryTest, KeepsItsCountersOverAResume) {
   summary.training_s = 12.5;
   summary.launches = 2;
   summary.final_results = {Against("random", 0.9)};
+  summary.final_policy = "average";
   ASSERT_TRUE(WriteSummary(summary, run).ok());
   const Json json = Json::parse(*ReadFile(run.summary()));
   EXPECT_EQ(json["games"], 12345);
@@ -48,6 +49,8 @@ TEST(SummaryTest, KeepsItsCountersOverAResume) {
   EXPECT_EQ(read.commit, "abc+changes");
   EXPECT_EQ(json["matrix_products"], "a library, bfloat16");
   EXPECT_EQ(read.matrix_products, "a library, bfloat16");
+  EXPECT_EQ(json["policy"], "average");
+  EXPECT_EQ(read.final_policy, "average");
   ASSERT_EQ(read.final_results.size(), 1);
   EXPECT_EQ(ToJson(read.final_results[0]), ToJson(summary.final_results[0]));
 }

@@ -124,7 +124,7 @@ TEST_F(ReportTest, ListsEveryCellWithCommitTimeAndSettings) {
   const std::string text = Output("report.md");
   EXPECT_THAT(LineOf(text, "| hopper-medium | dbr | 1 |"),
               ContainsRegex("done . max_updates . 0123456789ab . 1:02:03 . 30,000 . 0 . 0 . [0-9a-f]{8} . a "
-                            "library, float32 "));
+                            "library, float32 . average "));
   EXPECT_THAT(text, HasSubstr("|  | bear | 2 | running |"));
   EXPECT_THAT(text, HasSubstr("learner.max_updates: 30000\n"));
   EXPECT_THAT(text, HasSubstr("algorithm.dbr.constraint: FIXED\n"));

@@ -27,6 +27,7 @@ RunSummary Finished(std::uint64_t seed) {
   summary.algorithm = "dbr";
   summary.commit = "0123456789abcdef0123456789abcdef01234567";
   summary.matrix_products = "a library, float32";
+  summary.final_policy = "average";
   summary.ended = RunEnding::kMaxUpdates;
   summary.wall_s = 3723;
   summary.updates = 30000;

@@ -236,6 +236,12 @@ TEST_P(Conformance, ALossThatIsNotFiniteIsNamed) {
   EXPECT_THAT(std::string(status.message()), testing::HasSubstr("critic_loss"));
 }
 
+// True where an algorithm's own updates read the target of its policy. The others keep it for evaluations
+// alone, which find a NaN in it when they act.
+bool ReadsPolicyTarget(const std::string& algorithm) {
+  return algorithm != "sac" && algorithm != "discrete_sac" && algorithm != "awac";
+}
+
 // One NaN anywhere in the state (a network, a target, a moment of Adam, the multiplier) reaches the figures
 // of one of the next updates: nothing on the way takes the other, finite side.
 TEST_P(Conformance, ANaNInTheStateEndsTraining) {
@@ -245,6 +251,7 @@ TEST_P(Conformance, ANaNInTheStateEndsTraining) {
   const bool multiplied = GetParam().variant != "Mrl" && GetParam().id.name != "brac";  // else it is constant
   for (const auto& [name, values] : sound.tensors) {
     if (absl::StartsWith(name, "log_alpha") && !multiplied) continue;
+    if (name == "policy.target" && !ReadsPolicyTarget(GetParam().id.name)) continue;
     // The end of a policy may be the bias of a log-std that nothing reads.
     const std::size_t last = absl::StartsWith(name, "critic") ? values.size() - 1 : 0;
     for (const std::size_t place : {std::size_t{0}, last}) {

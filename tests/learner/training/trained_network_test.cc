@@ -163,6 +163,25 @@ TEST_P(TrainedNetworkTest, ProductsReadTheParametersThatWereLoaded) {
   EXPECT_EQ(loaded.target(), saved.target());
 }
 
+TEST_P(TrainedNetworkTest, ATargetThatAFileLacksStartsFromTheOnlineNetwork) {
+  Network saved = Make(1), loaded = Make(2);
+  for (int step = 0; step < 3; ++step) Step(&saved);
+  TensorFile file;
+  saved.Save("network", &file);
+  ASSERT_TRUE(loaded.LoadOrStartTarget("network", file).ok());
+  EXPECT_EQ(loaded.target(), saved.target()) << "it is there";
+
+  ASSERT_EQ(file.tensors.erase("network.target"), 1u);
+  EXPECT_TRUE(absl::IsDataLoss(loaded.Load("network", file)));
+  ASSERT_TRUE(loaded.LoadOrStartTarget("network", file).ok());
+  EXPECT_EQ(loaded.parameters(), saved.parameters());
+  EXPECT_EQ(loaded.target(), saved.parameters());
+  ExpectReadsItsParameters(&loaded);
+
+  file.tensors.erase("network.adam.first");
+  EXPECT_TRUE(absl::IsDataLoss(loaded.LoadOrStartTarget("network", file)));
+}
+
 INSTANTIATE_TEST_SUITE_P(Precisions, TrainedNetworkTest,
                          testing::Values(NetworkCase{false, {}}, NetworkCase{false, {33}},
                                          NetworkCase{false, {600, 70}}, NetworkCase{true, {}},
