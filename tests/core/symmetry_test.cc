@@ -24,7 +24,7 @@ TEST(CheckSymmetry, NamesWhatIsNone) {
               HasSubstr("symmetry.observation: expected 3 places, one for each float, found 2"));
   EXPECT_THAT(ErrorOf({.observation = {2, 1, 0}, .action = {}}),
               HasSubstr("symmetry.action: expected 2 places"));
-  EXPECT_THAT(ErrorOf({.observation = {2, 1, 0}, .action = {1, 2}}),
+  EXPECT_THAT(ErrorOf({.observation = {2, 1, 0}, .action = {0, 2}}),
               HasSubstr("symmetry.action: expected places from 0 to 1, found 2"));
   EXPECT_THAT(ErrorOf({.observation = {-1, 1, 0}, .action = {1, 0}}), HasSubstr("found -1"));
   EXPECT_THAT(ErrorOf({.observation = {1, 2, 0}, .action = {1, 0}}),
