@@ -121,9 +121,10 @@ TEST_F(NStepImportTest, EveryLayoutGivesThePlainLoopsTransitions) {
     EXPECT_EQ(record_.episodes, one_step.episodes);
     EXPECT_EQ(record_.return_mean, one_step.return_mean);
   }
-  WriteMinari(path_, episodes_);
-  ExpectSame(Import(3, "minari"), expected);
-  ExpectSame(Import(7, "minari"), PlainLoop(episodes_, 7));
+  const std::vector<TestEpisode> some(episodes_.begin(), episodes_.begin() + 40);  // a group each is slow
+  WriteMinari(path_, some);
+  ExpectSame(Import(3, "minari"), PlainLoop(some, 3));
+  ExpectSame(Import(7, "minari"), PlainLoop(some, 7));
 }
 
 // Without `next_observations` the step at a time limit is no transition.
@@ -185,7 +186,7 @@ TEST_F(NStepImportTest, AnImportThatWasBrokenOffGoesOnWithinAnEpisode) {
   for (int i = 0; i < 1234; ++i) some.insert(some.end(), whole[i].begin(), whole[i].end());
   ASSERT_TRUE(buffer->InsertSeedBuffer(some).ok());
   const auto record = ImportSeedBuffer(
-      {.path = path_, .env = "test_robot", .discount = kDiscount, .n_step = 3}, buffer.get());
+      {.path = path_, .layout = "", .env = "test_robot", .discount = kDiscount, .n_step = 3}, buffer.get());
   ASSERT_TRUE(record.ok()) << record.status();
   buffer.reset();
   EXPECT_EQ(RowsOf(folder_ / "2.store", kLayout), whole);
