@@ -45,7 +45,8 @@ struct AlgorithmSpec {
   ActionSpace actions;
   std::vector<int> hidden_sizes;
   bool normalize_observations = false;
-  bool bfloat16 = false;  // whether matrix products take bfloat16 and sum in float32
+  bool critic_layer_norm = false;  // whether the critics normalise their hidden layers
+  bool bfloat16 = false;           // whether matrix products take bfloat16 and sum in float32
   AlgorithmConfig config;
   std::uint64_t seed = 0;
 };

@@ -136,16 +136,17 @@ TEST_F(RunPlanTest, RefusesToResumeAnotherRunAndNamesTheFields) {
   ASSERT_TRUE(PrepareRun(Options(), kNow).ok());
   MakeStore();
   const std::string before = *ReadFile(RunFolder{run_}.config());
-  const auto plan =
-      PrepareRun(Options({"replay.capacity=6000", "replay.byte_budget=100000000",
-                          "network.hidden_sizes=[64, 64]", "algorithm.dbr.epsilon=0.1", "seed=5"},
-                         true),
-                 kNow);
+  const auto plan = PrepareRun(
+      Options({"replay.capacity=6000", "replay.byte_budget=100000000", "network.hidden_sizes=[64, 64]",
+               "network.critic_layer_norm=true", "algorithm.dbr.epsilon=0.1", "seed=5"},
+              true),
+      kNow);
   EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(
       std::string(plan.status().message()),
       AllOf(HasSubstr("replay.capacity: 5000 -> 6000"), HasSubstr("replay.byte_budget: 0 -> 100000000"),
-            HasSubstr("hidden_sizes"), HasSubstr("epsilon"), HasSubstr("seed: 1 -> 5")));
+            HasSubstr("hidden_sizes"), HasSubstr("network.critic_layer_norm: false -> true"),
+            HasSubstr("epsilon"), HasSubstr("seed: 1 -> 5")));
   EXPECT_EQ(*ReadFile(RunFolder{run_}.config()), before);
 }
 
