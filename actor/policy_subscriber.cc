@@ -31,7 +31,8 @@ PolicySpec ExpectedPolicy(const EnvSpec& env, const Config& config) {
           .algorithm = "",
           .observation_size = env.observation_size,
           .actions = env.actions,
-          .hidden_sizes = HiddenSizes(config)};
+          .hidden_sizes = HiddenSizes(config),
+          .critic_layer_norm = config.network().critic_layer_norm()};
 }
 
 struct PolicySubscriber::Stub {

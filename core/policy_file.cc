@@ -17,6 +17,8 @@ namespace {
 
 constexpr char kDiscrete[] = "discrete";
 constexpr char kContinuous[] = "continuous";
+constexpr char kTrue[] = "true";
+constexpr char kFalse[] = "false";
 
 // Reads typed metadata; keeps the first error, so that a list of fields reads as a list.
 class MetadataReader {
@@ -48,6 +50,13 @@ class MetadataReader {
     const std::string text = Text(key);
     if (text != kDiscrete && text != kContinuous) FailAsDamaged(key, "discrete or continuous", text);
     return text == kContinuous ? ActionKind::kContinuous : ActionKind::kDiscrete;
+  }
+  // False where the key is missing: older files do not have it.
+  bool Flag(const std::string& key) {
+    if (metadata_.find(key) == metadata_.end()) return false;
+    const std::string text = Text(key);
+    if (text != kTrue && text != kFalse) FailAsDamaged(key, "true or false", text);
+    return text == kTrue;
   }
   std::vector<int> Sizes(const std::string& key) {
     std::vector<int> sizes;
@@ -95,6 +104,7 @@ absl::StatusOr<TensorFile> PolicyTensors(const PolicySnapshot& snapshot) {
                    {"action_kind", spec.actions.discrete() ? kDiscrete : kContinuous},
                    {"action_size", absl::StrCat(spec.actions.size)},
                    {"hidden_sizes", absl::StrJoin(spec.hidden_sizes, ",")},
+                   {"critic_layer_norm", spec.critic_layer_norm ? kTrue : kFalse},
                    {"version", absl::StrCat(snapshot.version)},
                    {"updates", absl::StrCat(snapshot.updates)},
                    {"support_epsilon", absl::StrFormat("%.9g", snapshot.support_epsilon)},
@@ -117,6 +127,7 @@ absl::StatusOr<PolicySnapshot> LoadPolicy(const std::string& path) {
   snapshot.spec.actions.kind = reader.Kind("action_kind");
   snapshot.spec.actions.size = reader.Count<int>("action_size");
   snapshot.spec.hidden_sizes = reader.Sizes("hidden_sizes");
+  snapshot.spec.critic_layer_norm = reader.Flag("critic_layer_norm");
   snapshot.version = reader.Count<std::uint64_t>("version");
   snapshot.updates = reader.Count<std::uint64_t>("updates");
   snapshot.support_epsilon = reader.Real("support_epsilon");

@@ -30,6 +30,8 @@ absl::Status CheckSameSpec(const PolicySpec& expected, const PolicySpec& found) 
   differ("observation_size", absl::StrCat(expected.observation_size), absl::StrCat(found.observation_size));
   differ("actions", Describe(expected.actions), Describe(found.actions));
   differ("hidden_sizes", absl::StrJoin(expected.hidden_sizes, "-"), absl::StrJoin(found.hidden_sizes, "-"));
+  const auto yes_or_no = [](bool value) { return std::string(value ? "true" : "false"); };
+  differ("critic_layer_norm", yes_or_no(expected.critic_layer_norm), yes_or_no(found.critic_layer_norm));
   if (!expected.algorithm.empty()) differ("algorithm", expected.algorithm, found.algorithm);
   if (differences.empty()) return absl::OkStatus();
   return absl::InvalidArgumentError(

@@ -47,7 +47,8 @@ struct AlgorithmSpec {
   Symmetry symmetry;  // of the environment; empty where it has none
   std::vector<int> hidden_sizes;
   bool normalize_observations = false;
-  bool bfloat16 = false;  // whether matrix products take bfloat16 and sum in float32
+  bool critic_layer_norm = false;  // whether the critics normalise their hidden layers
+  bool bfloat16 = false;           // whether matrix products take bfloat16 and sum in float32
   AlgorithmConfig config;
   std::uint64_t seed = 0;
 };

@@ -49,11 +49,13 @@ VectorX<Scalar> InitialParameters(const MlpShape& shape, Rng& rng) {
   VectorX<Scalar> parameters(shape.parameter_count());
   for (int layer = 0; layer < shape.layer_count(); ++layer) {
     const double bound = 1.0 / std::sqrt(static_cast<double>(shape.in(layer)));
-    const Eigen::Index end =
-        layer + 1 < shape.layer_count() ? shape.weight_offset(layer + 1) : shape.parameter_count();
+    const Eigen::Index end = shape.bias_offset(layer) + shape.out(layer);
     for (Eigen::Index i = shape.weight_offset(layer); i < end; ++i) {
       parameters[i] = static_cast<Scalar>(bound * (2.0 * rng.Uniform() - 1.0));
     }
+    if (!shape.layer_norm() || layer + 1 == shape.layer_count()) continue;
+    parameters.segment(shape.gain_offset(layer), shape.out(layer)).setOnes();
+    parameters.segment(shape.shift_offset(layer), shape.out(layer)).setZero();
   }
   return parameters;
 }

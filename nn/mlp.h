@@ -1,4 +1,5 @@
-// A multi-layer perceptron with ReLU hidden layers whose parameters are ONE flat vector.
+// A multi-layer perceptron with ReLU hidden layers, normalised or not (MlpShape), whose parameters are ONE
+// flat vector.
 #pragma once
 
 #include <Eigen/Core>
@@ -53,7 +54,7 @@ template <class Scalar>
 void MlpInputGradientOfDeltas(const MlpParameters<Scalar>& parameters, const ConstMatrixRef<Scalar>& dy,
                               MlpActivations<Scalar>* activations, MatrixX<Scalar>* dx);
 
-// Weights and biases uniform in +-1/sqrt(fan-in), as PyTorch's linear layers start.
+// Weights and biases uniform in +-1/sqrt(fan-in), as PyTorch's linear layers start; gains 1 and shifts 0.
 template <class Scalar>
 VectorX<Scalar> InitialParameters(const MlpShape& shape, Rng& rng);
 

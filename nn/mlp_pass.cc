@@ -80,6 +80,8 @@ void MlpPass<Element>::SetShape(const MlpShape& shape) {
   // What another shape left in rows that are padding now would not be 0.
   hidden_.clear();
   deltas_.clear();
+  norms_.clear();
+  if (shape.layer_norm()) norms_.resize(static_cast<std::size_t>(shape.layer_count() - 1));
   input_.resize(0, 0);
   d_output_.resize(0, 0);
   products_.clear();
@@ -129,23 +131,54 @@ Columns<const Element> MlpPass<Element>::OutputDelta(const Columns<const Sum>& d
 }
 
 template <class Element>
+LayerNormParameters<SumOf<Element>> MlpPass<Element>::Norm(const Parameters& parameters, int layer) const {
+  return {parameters.values + shape_.gain_offset(layer), parameters.values + shape_.shift_offset(layer)};
+}
+
+template <class Element>
+Columns<const Element> MlpPass<Element>::HiddenForward(const Parameters& parameters, int layer,
+                                                       Columns<const Element> from, Eigen::Index first) {
+  const Columns<Element> to = ColumnsOf(&hidden_[layer], first, from.cols);
+  if (shape_.layer_norm()) {
+    products_[layer]->Output(Layer(parameters, layer), from, norms_[layer].Sums(first, from.cols));
+    norms_[layer].Forward(Norm(parameters, layer), first, to);
+  } else {
+    products_[layer]->Hidden(Layer(parameters, layer), from, to);
+  }
+  return to;
+}
+
+template <class Element>
+void MlpPass<Element>::HiddenBackward(const Parameters& parameters, int layer, Eigen::Index sample,
+                                      Element* delta, Sum* gradient) {
+  const Element* const output = hidden_[layer].col(sample).data();
+  Sum* const bias = gradient == nullptr ? nullptr : gradient + shape_.bias_offset(layer);
+  if (!shape_.layer_norm()) return MaskColumn(output, delta, shape_.out(layer), bias);
+  if (gradient == nullptr) {
+    return norms_[layer].Backward(Norm(parameters, layer), sample, output, delta, nullptr);
+  }
+  const LayerNormGradient<Sum> sums{bias, gradient + shape_.gain_offset(layer),
+                                    gradient + shape_.shift_offset(layer)};
+  norms_[layer].Backward(Norm(parameters, layer), sample, output, delta, &sums);
+}
+
+template <class Element>
 const MatrixX<SumOf<Element>>& MlpPass<Element>::Forward(const MlpShape& shape, const Parameters& parameters,
                                                          const ConstMatrixRef<Sum>& x) {
   DBR_CHECK(x.rows() == shape.input_size());
   SetShape(shape);
   const int last = shape.layer_count() - 1;
   hidden_.resize(static_cast<std::size_t>(last));
-  for (int layer = 0; layer < last; ++layer) ResizePadded(shape.out(layer), x.cols(), &hidden_[layer]);
+  for (int layer = 0; layer < last; ++layer) {
+    ResizePadded(shape.out(layer), x.cols(), &hidden_[layer]);
+    if (shape.layer_norm()) norms_[layer].Resize(shape.out(layer), x.cols());
+  }
   output_.resize(shape.output_size(), x.cols());
   const Columns<const Element> input = Input(x, /*fresh=*/true);
   for (Eigen::Index first = 0; first < x.cols(); first += kBlockColumns) {
     const Eigen::Index n = std::min(kBlockColumns, x.cols() - first);
     Columns<const Element> from = input.Middle(first, n);
-    for (int layer = 0; layer < last; ++layer) {
-      const Columns<Element> to = ColumnsOf(&hidden_[layer], first, n);
-      products_[layer]->Hidden(Layer(parameters, layer), from, to);
-      from = to;
-    }
+    for (int layer = 0; layer < last; ++layer) from = HiddenForward(parameters, layer, from, first);
     products_[last]->Output(Layer(parameters, last), from, ColumnsOf(&output_, first, n));
   }
   return output_;
@@ -158,7 +191,7 @@ void MlpPass<Element>::ParameterGradient(const Parameters& parameters, const Con
   DBR_CHECK(dy.rows() == shape_.output_size() && dy.cols() == n);
   gradient->resize(shape_.parameter_count());
   for (int layer = 0; layer < shape_.layer_count(); ++layer) {
-    gradient->segment(shape_.bias_offset(layer), shape_.out(layer)).setZero();
+    gradient->segment(shape_.bias_offset(layer), shape_.vector_count(layer)).setZero();
   }
   ResizeDeltas(n);
   Columns<const Element> delta = OutputDelta(ColumnsOf<Sum>(dy, 0, n));
@@ -172,8 +205,7 @@ void MlpPass<Element>::ParameterGradient(const Parameters& parameters, const Con
     const Columns<Element> previous = ColumnsOf(&deltas_[layer - 1], 0, n);
     products_[layer]->HiddenGradient(Layer(parameters, layer), delta, previous);
     for (Eigen::Index j = 0; j < n; ++j) {
-      MaskColumn(input.values + j * input.stride, previous.values + j * previous.stride, shape_.in(layer),
-                 gradient->data() + shape_.bias_offset(layer - 1));
+      HiddenBackward(parameters, layer - 1, j, previous.values + j * previous.stride, gradient->data());
     }
     delta = previous;
   }
@@ -200,10 +232,9 @@ void MlpPass<Element>::Backpropagate(const Parameters& parameters, Columns<const
   for (int layer = shape_.layer_count() - 1; layer > 0; --layer) {
     const Columns<Element> previous = ColumnsOf(&deltas_[layer - 1], first, delta.cols);
     products_[layer]->HiddenGradient(Layer(parameters, layer), delta, previous);
-    const MatrixX<Element>& output = hidden_[layer - 1];
     for (Eigen::Index j = 0; j < active_.count; ++j) {
-      MaskColumn(output.col(first + active_.columns[j]).data(), previous.values + j * previous.stride,
-                 shape_.in(layer), static_cast<Sum*>(nullptr));
+      HiddenBackward(parameters, layer - 1, first + active_.columns[j], previous.values + j * previous.stride,
+                     nullptr);
     }
     delta = previous;
   }

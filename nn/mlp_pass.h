@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/batch.h"
+#include "nn/layer_norm.h"
 #include "nn/mlp_parameters.h"
 #include "nn/mlp_shape.h"
 #include "nn/product/layer_products.h"
@@ -52,6 +53,15 @@ class MlpPass {
   void SetShape(const MlpShape& shape);
   void ResizeDeltas(Eigen::Index n);
   LayerParameters<Element> Layer(const Parameters& parameters, int layer) const;
+  LayerNormParameters<Sum> Norm(const Parameters& parameters, int layer) const;
+  // The output of a hidden layer for samples first ... first + from.cols, into hidden_.
+  Columns<const Element> HiddenForward(const Parameters& parameters, int layer, Columns<const Element> from,
+                                       Eigen::Index first);
+  // Turns `delta`, the gradient at a hidden layer's output for the sample in column `sample` of hidden_, into
+  // that at its W x + b, in place, and adds to the layer's part of `gradient` [parameter_count] but its
+  // weight's, unless it is null.
+  void HiddenBackward(const Parameters& parameters, int layer, Eigen::Index sample, Element* delta,
+                      Sum* gradient);
   // The network's input as products take it: x itself, or rounded into input_ where `fresh`.
   Columns<const Element> Input(const ConstMatrixRef<Sum>& x, bool fresh);
   // The gradient at the output as products take it: columns of dy itself, or rounded into d_output_.
@@ -71,11 +81,12 @@ class MlpPass {
   MlpShape shape_;
   std::vector<std::unique_ptr<LayerProducts<Element>>> products_;  // of each layer
   // Some have more columns than the newest batch.
-  std::vector<MatrixX<Element>> hidden_;  // [out x n] each hidden layer's output after its ReLU, padded
-  std::vector<MatrixX<Element>> deltas_;  // [in x n] the gradient at each layer's input but the first's
-  MatrixX<Element> input_, d_output_;     // [in x n], [out x n] rounded and padded, for Bfloat16
-  MatrixX<Sum> output_;                   // [out x n]
-  MatrixX<Sum> active_dy_;                // [out x kBlockColumns] the columns of dy that are not 0
+  std::vector<MatrixX<Element>> hidden_;   // [out x n] each hidden layer's output after its ReLU, padded
+  std::vector<MatrixX<Element>> deltas_;   // [in x n] the gradient at each layer's input but the first's
+  std::vector<LayerNorm<Element>> norms_;  // of each hidden layer, where they are normalised
+  MatrixX<Element> input_, d_output_;      // [in x n], [out x n] rounded and padded, for Bfloat16
+  MatrixX<Sum> output_;                    // [out x n]
+  MatrixX<Sum> active_dy_;                 // [out x kBlockColumns] the columns of dy that are not 0
   ActiveSamples active_;
   Eigen::Index prepared_columns_ = 0;  // of the largest block that PrepareInputGradient was called for
 };

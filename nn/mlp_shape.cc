@@ -4,14 +4,17 @@
 
 namespace dbr {
 
-MlpShape::MlpShape(int input_size, const std::vector<int>& hidden_sizes, int output_size) {
+MlpShape::MlpShape(int input_size, const std::vector<int>& hidden_sizes, int output_size, bool layer_norm)
+    : layer_norm_(layer_norm) {
   sizes_.push_back(input_size);
   sizes_.insert(sizes_.end(), hidden_sizes.begin(), hidden_sizes.end());
   sizes_.push_back(output_size);
   offsets_.push_back(0);
   for (int layer = 0; layer < layer_count(); ++layer) {
     DBR_CHECK(in(layer) > 0 && out(layer) > 0);
-    offsets_.push_back(offsets_.back() + Eigen::Index{in(layer) + 1} * out(layer));
+    const bool normalized = layer_norm && layer + 1 < layer_count();
+    const int vectors = normalized ? 3 : 1;  // bias, gain, shift
+    offsets_.push_back(offsets_.back() + Eigen::Index{in(layer) + vectors} * out(layer));
   }
 }
 

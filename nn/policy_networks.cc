@@ -26,8 +26,9 @@ MlpShape PolicyShape(const PolicySpec& spec) {
 }
 
 MlpShape CriticShape(const PolicySpec& spec) {
-  if (spec.actions.discrete()) return PolicyShape(spec);
-  return MlpShape(spec.observation_size + spec.actions.size, spec.hidden_sizes, 1);
+  const bool discrete = spec.actions.discrete();
+  return MlpShape(spec.observation_size + (discrete ? 0 : spec.actions.size), spec.hidden_sizes,
+                  discrete ? spec.actions.size : 1, spec.critic_layer_norm);
 }
 
 absl::StatusOr<std::shared_ptr<const PolicyNetworks>> PolicyNetworks::Create(PolicySnapshot snapshot) {

@@ -55,6 +55,7 @@ absl::StatusOr<AlgorithmSpec> MakeSpec(const Config& config) {
                        .symmetry = env->spec().symmetry,
                        .hidden_sizes = HiddenSizes(config),
                        .normalize_observations = config.network().normalize_observations(),
+                       .critic_layer_norm = config.network().critic_layer_norm(),
                        .bfloat16 = bfloat16,
                        .config = config.algorithm(),
                        .seed = config.seed()};

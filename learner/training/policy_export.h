@@ -12,7 +12,8 @@ inline PolicySpec PolicySpecOf(const AlgorithmSpec& spec) {
           .algorithm = AlgorithmName(spec.config),
           .observation_size = spec.observation_size,
           .actions = spec.actions,
-          .hidden_sizes = spec.hidden_sizes};
+          .hidden_sizes = spec.hidden_sizes,
+          .critic_layer_norm = spec.critic_layer_norm};
 }
 
 // Sets the snapshot's spec and removes its networks.

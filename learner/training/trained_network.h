@@ -105,7 +105,7 @@ class TrainedNetwork {
           }
         }
       }
-      StepPart(shape_.bias_offset(layer), rows);
+      StepPart(shape_.bias_offset(layer), shape_.vector_count(layer));
       if constexpr (std::is_same_v<Scalar, float>) {
         const Eigen::Index bias = shape_.bias_offset(layer);
         if (!rounded_.empty()) rounded_.CopyBias(layer, parameters_.data() + bias);

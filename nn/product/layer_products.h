@@ -57,7 +57,7 @@ class LayerProducts {
   // 0; it is 0 but for rounding.
   virtual void Hidden(const LayerParameters<Element>& layer, Columns<const Element> x,
                       Columns<Element> y) = 0;
-  // y [out x n] = W x + b, from x [in x n].
+  // y [out x n] = W x + b, from x [in x n]. y may be padded too.
   virtual void Output(const LayerParameters<Element>& layer, Columns<const Element> x, Columns<Sum> y) = 0;
   // dx = W^T delta, from delta [out x n]: the gradient at another layer's output. dx may have fewer rows than
   // the layer has inputs: it is the gradient at the first ones then.

@@ -110,6 +110,7 @@ PolicyMessage Encode(const PolicySnapshot& snapshot) {
   message.set_discrete(snapshot.spec.actions.discrete());
   message.set_action_size(snapshot.spec.actions.size);
   for (const int size : snapshot.spec.hidden_sizes) message.add_hidden_sizes(size);
+  message.set_critic_layer_norm(snapshot.spec.critic_layer_norm);
   for (const auto& [name, parameters] : snapshot.networks) {
     NamedNetwork* network = message.add_networks();
     network->set_name(name);
@@ -145,6 +146,7 @@ absl::StatusOr<PolicySnapshot> Decode(const PolicyMessage& message) {
   snapshot.spec.actions = {message.discrete() ? ActionKind::kDiscrete : ActionKind::kContinuous,
                            static_cast<int>(message.action_size())};
   for (const auto size : message.hidden_sizes()) snapshot.spec.hidden_sizes.push_back(static_cast<int>(size));
+  snapshot.spec.critic_layer_norm = message.critic_layer_norm();
   snapshot.support_epsilon = message.support_epsilon();
   for (const NamedNetwork& network : message.networks()) {
     snapshot.networks.emplace_back(

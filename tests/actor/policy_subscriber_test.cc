@@ -95,6 +95,16 @@ TEST_F(PolicySubscriberTest, RefusesPoliciesOfOtherNetworkSizesForGood) {
   EXPECT_EQ(subscriber->Current().status(), status);
 }
 
+TEST_F(PolicySubscriberTest, RefusesPoliciesWithOtherwiseNormalisedCriticsForGood) {
+  LearnerDouble learner(address_);
+  PolicySnapshot other = UntrainedSnapshot(spec_, 1);
+  other.spec.critic_layer_norm = true;
+  learner.Offer(Encode(other));
+  const absl::Status status = Subscribe()->WaitForFirst(kLong).status();
+  EXPECT_TRUE(absl::IsInvalidArgument(status)) << status;
+  EXPECT_THAT(std::string(status.message()), HasSubstr("critic_layer_norm: expected false, found true"));
+}
+
 TEST_F(PolicySubscriberTest, RefusesPoliciesOfAnotherEnvironmentForGood) {
   LearnerDouble learner(address_);
   learner.Offer(Encode(UntrainedSnapshot(Connect4Spec(), 1)));

@@ -136,6 +136,11 @@ AlgorithmSpec InBfloat16(AlgorithmSpec spec) {
   return spec;
 }
 
+AlgorithmSpec WithLayerNorm(AlgorithmSpec spec) {
+  spec.critic_layer_norm = true;
+  return spec;
+}
+
 // Each update in single precision and, where the processor has it, in bfloat16.
 void Register(const std::string& name, const AlgorithmSpec& spec, bool real_time) {
   const auto add = [&](const std::string& full_name, const AlgorithmSpec& of) {
@@ -157,7 +162,9 @@ const bool kUpdatesRegistered = [] {
   add("discrete_sac/connect4", Connect4(), DiscreteSac);
   add("ddqn/connect4", Connect4(), Ddqn);
   add("sac/hopper", Hopper(), Sac);
+  add("sac_layer_norm/hopper", WithLayerNorm(Hopper()), Sac);
   add("dbr/hopper", Hopper(), Dbr);
+  add("dbr_layer_norm/hopper", WithLayerNorm(Hopper()), Dbr);
   add("dbr_of_the_configs/hopper", Hopper(), DbrOfTheConfigs);
   add("dbr/ant", Ant(), Dbr);
   add("bear/ant", Ant(), Bear);

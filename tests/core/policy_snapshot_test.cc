@@ -27,6 +27,7 @@ TEST(CheckSameSpecTest, NamesEveryFieldThatDiffers) {
   other.observation_size = 15;
   other.actions = {ActionKind::kContinuous, 3};
   other.hidden_sizes = {64};
+  other.critic_layer_norm = true;
   other.algorithm = "sac";
   const absl::Status status = CheckSameSpec(Spec(), other);
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
@@ -35,6 +36,7 @@ TEST(CheckSameSpecTest, NamesEveryFieldThatDiffers) {
   EXPECT_THAT(message, HasSubstr("observation_size: expected 84, found 15"));
   EXPECT_THAT(message, HasSubstr("actions: expected 7 choices, found 3 dimensions"));
   EXPECT_THAT(message, HasSubstr("hidden_sizes: expected 256-256, found 64"));
+  EXPECT_THAT(message, HasSubstr("critic_layer_norm: expected false, found true"));
   EXPECT_THAT(message, HasSubstr("algorithm: expected dbr, found sac"));
 }
 

@@ -180,7 +180,8 @@ PolicySnapshot Snapshot() {
                    .algorithm = "dbr",
                    .observation_size = 84,
                    .actions = {ActionKind::kDiscrete, 7},
-                   .hidden_sizes = {256, 128}};
+                   .hidden_sizes = {256, 128},
+                   .critic_layer_norm = true};
   snapshot.support_epsilon = 0.1f;
   snapshot.networks = {{kPolicyNetwork, {1, 2}}, {kCritic1, {3}}, {kBetaPlus, {4, 5, 6}}};
   return snapshot;
@@ -203,6 +204,7 @@ TEST_F(PolicyFileTest, LoadsWhatWasSaved) {
   for (const ActionKind kind : {ActionKind::kDiscrete, ActionKind::kContinuous}) {
     PolicySnapshot snapshot = Snapshot();
     snapshot.spec.actions.kind = kind;
+    snapshot.spec.critic_layer_norm = kind == ActionKind::kDiscrete;
     ASSERT_TRUE(SavePolicy(snapshot, path_).ok());
     const auto loaded = LoadPolicy(path_);
     ASSERT_TRUE(loaded.ok()) << loaded.status();
@@ -219,6 +221,7 @@ TEST_F(PolicyFileTest, NamesEachMissingField) {
   const TensorFile good = Good();
   ASSERT_GE(good.metadata.size(), 10u);
   for (const auto& [key, value] : good.metadata) {
+    if (key == "critic_layer_norm") continue;  // older files do not have it
     TensorFile file = good;
     file.metadata.erase(key);
     const absl::Status status = LoadAltered(file);
@@ -228,15 +231,21 @@ TEST_F(PolicyFileTest, NamesEachMissingField) {
   }
 }
 
+TEST_F(PolicyFileTest, AnOlderFileHasNoLayerNorm) {
+  TensorFile file = Good();
+  ASSERT_EQ(file.metadata.at("critic_layer_norm"), "true");
+  file.metadata.erase("critic_layer_norm");
+  ASSERT_TRUE(SaveTensors(file, path_).ok());
+  const auto loaded = LoadPolicy(path_);
+  ASSERT_TRUE(loaded.ok()) << loaded.status();
+  EXPECT_FALSE(loaded->spec.critic_layer_norm);
+}
+
 TEST_F(PolicyFileTest, NamesEachFieldThatMakesNoSense) {
-  const std::pair<const char*, const char*> bad[] = {{"observation_size", "many"},
-                                                     {"observation_size", "-1"},
-                                                     {"action_kind", "both"},
-                                                     {"action_size", "99999999999"},
-                                                     {"hidden_sizes", "256,x"},
-                                                     {"hidden_sizes", "256,0"},
-                                                     {"version", "-7"},
-                                                     {"support_epsilon", "small"}};
+  const std::pair<const char*, const char*> bad[] = {
+      {"observation_size", "many"},     {"observation_size", "-1"}, {"action_kind", "both"},
+      {"action_size", "99999999999"},   {"hidden_sizes", "256,x"},  {"hidden_sizes", "256,0"},
+      {"critic_layer_norm", "perhaps"}, {"version", "-7"},          {"support_epsilon", "small"}};
   const TensorFile good = Good();
   for (const auto& [key, value] : bad) {
     TensorFile file = good;

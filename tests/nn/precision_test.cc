@@ -26,6 +26,7 @@ double RelativeError(const Matrix& a, const Matrix& b) {
 struct Case {
   std::vector<int> hidden;
   Eigen::Index n;
+  bool layer_norm = false;
 };
 
 class Bfloat16Network : public testing::TestWithParam<Case> {
@@ -42,8 +43,12 @@ constexpr double kOutputTolerance = 0.02, kGradientTolerance = 0.1;
 
 TEST_P(Bfloat16Network, AgreesWithFloat32) {
   Rng rng(5);
-  const MlpShape shape(36, GetParam().hidden, 5);
-  const VectorX<float> parameters = InitialParameters<float>(shape, rng);
+  const MlpShape shape(36, GetParam().hidden, 5, GetParam().layer_norm);
+  VectorX<float> parameters = InitialParameters<float>(shape, rng);
+  for (int layer = 0; layer + 1 < shape.layer_count() && shape.layer_norm(); ++layer) {
+    auto vectors = parameters.segment(shape.gain_offset(layer), 2 * shape.out(layer));
+    vectors += 0.2f * Normal(vectors.size(), 1, rng);
+  }
   RoundedWeights rounded(shape);
   rounded.RoundAll(shape, parameters.data());
   const MlpParameters<float> full(parameters), reduced(parameters.data(), &rounded);
@@ -77,7 +82,8 @@ TEST_P(Bfloat16Network, AgreesWithFloat32) {
 INSTANTIATE_TEST_SUITE_P(Networks, Bfloat16Network,
                          testing::Values(Case{{}, 1}, Case{{}, 300}, Case{{6}, 5}, Case{{256, 256, 256}, 1},
                                          Case{{256, 256, 256}, 256}, Case{{256, 256}, 600},
-                                         Case{{50, 33}, 100}));
+                                         Case{{50, 33}, 100}, Case{{6}, 5, true},
+                                         Case{{256, 256, 256}, 256, true}, Case{{50, 33}, 600, true}));
 
 // One workspace may serve networks of different shapes in turn, as an actor's does.
 TEST(MlpActivationsTest, ServeNetworksOfTwoShapesInTurn) {

@@ -138,15 +138,17 @@ TEST_F(RunPlanTest, RefusesToResumeAnotherRunAndNamesTheFields) {
   const std::string before = *ReadFile(RunFolder{run_}.config());
   const auto plan = PrepareRun(
       Options({"replay.capacity=6000", "replay.byte_budget=100000000", "network.hidden_sizes=[64, 64]",
-               "algorithm.dbr.epsilon=0.1", "seed=5", "algorithm.discount=0.9", "algorithm.n_step=3"},
+               "network.critic_layer_norm=true", "algorithm.dbr.epsilon=0.1", "seed=5",
+               "algorithm.discount=0.9", "algorithm.n_step=3"},
               true),
       kNow);
   EXPECT_EQ(plan.status().code(), absl::StatusCode::kInvalidArgument);
   EXPECT_THAT(
       std::string(plan.status().message()),
       AllOf(HasSubstr("replay.capacity: 5000 -> 6000"), HasSubstr("replay.byte_budget: 0 -> 100000000"),
-            HasSubstr("hidden_sizes"), HasSubstr("epsilon"), HasSubstr("seed: 1 -> 5"),
-            HasSubstr("algorithm.discount: 0.99 -> 0.9"), HasSubstr("algorithm.n_step: 1 -> 3")));
+            HasSubstr("hidden_sizes"), HasSubstr("network.critic_layer_norm: false -> true"),
+            HasSubstr("epsilon"), HasSubstr("seed: 1 -> 5"), HasSubstr("algorithm.discount: 0.99 -> 0.9"),
+            HasSubstr("algorithm.n_step: 1 -> 3")));
   EXPECT_EQ(*ReadFile(RunFolder{run_}.config()), before);
 }
 

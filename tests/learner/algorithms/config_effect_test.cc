@@ -174,6 +174,25 @@ TEST(ConfigEffectTest, TheTableNamesFieldsThatThereAre) {
   }
 }
 
+// The field of NetworkConfig that an algorithm reads through its spec.
+TEST(ConfigEffectTest, CriticLayerNormChangesTheCriticsAndWhatIsLearned) {
+  for (const ActionKind actions : {ActionKind::kDiscrete, ActionKind::kContinuous}) {
+    AlgorithmSpec spec = SpecOf("dbr", "", actions);
+    const Networks base = Train(spec);
+    spec.critic_layer_norm = true;
+    const Networks changed = Train(spec);
+    ASSERT_EQ(base.size(), changed.size());
+    for (std::size_t i = 0; i < base.size(); ++i) {
+      const auto& [name, parameters] = changed[i];
+      const bool critic = name == kCritic1 || name == kCritic2;
+      // A gain and a shift for each unit of two layers of 8.
+      EXPECT_EQ(parameters.size(), base[i].second.size() + (critic ? 32 : 0)) << name;
+    }
+    EXPECT_EQ(base[0].first, kPolicyNetwork);
+    EXPECT_NE(base[0].second, changed[0].second);
+  }
+}
+
 class ConfigEffect : public testing::TestWithParam<Effect> {};
 
 TEST_P(ConfigEffect, ChangesWhatIsLearned) {

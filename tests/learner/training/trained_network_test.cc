@@ -26,11 +26,12 @@ constexpr int kSamples = 40;
 struct NetworkCase {
   bool bfloat16;
   std::vector<int> hidden_sizes;
+  bool layer_norm = false;
 };
 
 class TrainedNetworkTest : public testing::TestWithParam<NetworkCase> {
  protected:
-  TrainedNetworkTest() : shape_(6, GetParam().hidden_sizes, 4) {}
+  TrainedNetworkTest() : shape_(6, GetParam().hidden_sizes, 4, GetParam().layer_norm) {}
   void SetUp() override {
     if (GetParam().bfloat16 && !HasBfloat16()) {
       GTEST_SKIP() << "bfloat16 needs avx512_bf16 or amx_bf16, found " << ProcessorInstructions();
@@ -185,10 +186,13 @@ TEST_P(TrainedNetworkTest, ATargetThatAFileLacksStartsFromTheOnlineNetwork) {
 INSTANTIATE_TEST_SUITE_P(Precisions, TrainedNetworkTest,
                          testing::Values(NetworkCase{false, {}}, NetworkCase{false, {33}},
                                          NetworkCase{false, {600, 70}}, NetworkCase{true, {}},
-                                         NetworkCase{true, {33}}, NetworkCase{true, {600, 70}}),
+                                         NetworkCase{true, {33}}, NetworkCase{true, {600, 70}},
+                                         NetworkCase{false, {600, 70}, true},
+                                         NetworkCase{true, {600, 70}, true}),
                          [](const auto& info) {
                            return std::string(info.param.bfloat16 ? "Bfloat16" : "Float32") + "Depth" +
-                                  std::to_string(info.param.hidden_sizes.size());
+                                  std::to_string(info.param.hidden_sizes.size()) +
+                                  (info.param.layer_norm ? "LayerNorm" : "");
                          });
 
 }  // namespace

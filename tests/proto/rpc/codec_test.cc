@@ -173,16 +173,19 @@ PolicySnapshot Snapshot() {
 }
 
 TEST(PolicyCodecTest, DecodesWhatWasEncoded) {
-  const PolicySnapshot snapshot = Snapshot();
-  PolicyMessage received;
-  ASSERT_TRUE(received.ParseFromString(Encode(snapshot).SerializeAsString()));
-  const auto decoded = Decode(received);
-  ASSERT_TRUE(decoded.ok()) << decoded.status();
-  EXPECT_EQ(decoded->version, snapshot.version);
-  EXPECT_EQ(decoded->updates, snapshot.updates);
-  EXPECT_EQ(decoded->spec, snapshot.spec);
-  EXPECT_EQ(decoded->support_epsilon, snapshot.support_epsilon);
-  EXPECT_EQ(decoded->networks, snapshot.networks);
+  PolicySnapshot snapshot = Snapshot();
+  for (const bool layer_norm : {false, true}) {
+    snapshot.spec.critic_layer_norm = layer_norm;
+    PolicyMessage received;
+    ASSERT_TRUE(received.ParseFromString(Encode(snapshot).SerializeAsString()));
+    const auto decoded = Decode(received);
+    ASSERT_TRUE(decoded.ok()) << decoded.status();
+    EXPECT_EQ(decoded->version, snapshot.version);
+    EXPECT_EQ(decoded->updates, snapshot.updates);
+    EXPECT_EQ(decoded->spec, snapshot.spec);
+    EXPECT_EQ(decoded->support_epsilon, snapshot.support_epsilon);
+    EXPECT_EQ(decoded->networks, snapshot.networks);
+  }
 }
 
 TEST(PolicyCodecTest, DamagedParametersAreFound) {
