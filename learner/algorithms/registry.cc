@@ -98,8 +98,7 @@ absl::Status CheckCriticLayerNorm(const AlgorithmConfig& config, bool critic_lay
   if (!critic_layer_norm || config.algorithm_case() != AlgorithmConfig::kDdqn) return absl::OkStatus();
   return absl::InvalidArgumentError(
       "config field 'network.critic_layer_norm': expected false with the algorithm ddqn, whose one network "
-      "is its "
-      "policy too, found true. Leave it out, or choose an algorithm with critics.");
+      "is its policy too, found true. Leave it out, or choose an algorithm with critics.");
 }
 
 absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& spec) {
