@@ -64,7 +64,7 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
   // likelihoods are those of this struct's beta+ and beta-.
   template <class Likelihood>
   void FitBehaviorsTo(const BasicBatch<Scalar>& batch, Likelihood* plus, Likelihood* minus) {
-    partition.Split(this->advantages);
+    partition.Split(this->advantages, static_cast<float>(config().minus_margin()));
     this->runner.Run(
         [&] {
           if (partition.has_plus()) plus->Fit(batch, &partition.plus(), &beta_plus);

@@ -6,17 +6,17 @@
 
 namespace dbr {
 
-// Sorts a batch by its newest advantages A: A >= 0 is in D+, A <= 0 in D-. Reused from batch to batch. One
+// Sorts a batch by its newest advantages A: A >= 0 is in D+, A <= -margin in D-. Reused from batch to batch. One
 // thread at a time.
 template <class Scalar>
 class BatchPartition {
  public:
   // Sets plus() and minus() [n] from the advantages [n].
-  void Split(absl::Span<const float> advantages) {
+  void Split(absl::Span<const float> advantages, float margin) {
     const Eigen::Map<const Eigen::VectorXf> a(advantages.data(),
                                               static_cast<Eigen::Index>(advantages.size()));
     plus_ = (a.array() >= 0).template cast<Scalar>();
-    minus_ = (a.array() <= 0).template cast<Scalar>();
+    minus_ = (a.array() <= -margin).template cast<Scalar>();
     for (VectorX<Scalar>* weights : {&plus_, &minus_}) {
       const Scalar share = weights->mean();
       if (share > 0) *weights /= share;

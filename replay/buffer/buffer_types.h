@@ -19,6 +19,8 @@ struct BufferOptions {
   RateLimiterOptions limiter;
   // A relabel with `a` gives max(A, 0) + a in place of a, where A is the label before.
   bool cumulative_advantage = false;
+  // D- holds the rows with an advantage of -minus_margin or less.
+  double minus_margin = 0;
   // Share of the seed buffer's rows in a draw from D, while D holds others too; 0: as their numbers have it.
   double seed_buffer_share = 0;
   std::uint64_t seed = 1;                       // of the random numbers

@@ -54,7 +54,7 @@ PartitionedBuffer::PartitionedBuffer(std::unique_ptr<TransitionStore> store, con
       cumulative_advantage_(options.cumulative_advantage),
       now_(options.now),
       store_(std::move(store)),
-      rows_(store_.get()),
+      rows_(store_.get(), static_cast<float>(options.minus_margin)),
       admission_(limiter, store_.get(), &rows_.partitions()),
       drawer_(options.seed_buffer_share, options.seed, store_.get(), &rows_.partitions()),
       statistics_(options.now(), store_.get(), &rows_.partitions()) {}

@@ -20,8 +20,8 @@ const WriterIdentity& SeedBufferWriter() {
 
 }  // namespace
 
-PartitionedRows::PartitionedRows(TransitionStore* store)
-    : store_(*store), partitions_(static_cast<std::uint32_t>(store->capacity())) {
+PartitionedRows::PartitionedRows(TransitionStore* store, float minus_margin)
+    : store_(*store), partitions_(static_cast<std::uint32_t>(store->capacity()), minus_margin) {
   for (std::uint64_t rank = 0; rank < store_.size(); ++rank) {
     const std::uint32_t slot = store_.SlotOf(store_.KeyAtRank(rank));
     partitions_.Add(slot, store_.labels(slot).advantage, store_.labels(slot).source);

@@ -16,8 +16,9 @@ namespace dbr {
 // step with them. Thread-compatible: the buffer's mutex guards it, with the store.
 class PartitionedRows {
  public:
-  // Takes the rows that the store has. `store` is not owned and outlives this. O(size).
-  explicit PartitionedRows(TransitionStore* store);
+  // Takes the rows that the store has. `store` is not owned and outlives this. `minus_margin`: how far below
+  // 0 an advantage in D- is. O(size).
+  PartitionedRows(TransitionStore* store, float minus_margin);
   PartitionedRows(const PartitionedRows&) = delete;
   PartitionedRows& operator=(const PartitionedRows&) = delete;
 

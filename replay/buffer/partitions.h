@@ -10,8 +10,8 @@
 
 namespace dbr {
 
-// D holds all rows, D+ those with an advantage >= 0, D- those with one <= 0. The first three can be drawn
-// from.
+// D holds all rows, D+ those with an advantage >= 0, D- those with one <= -margin, which is <= 0 unless
+// DbrConfig.minus_margin says more. The first three can be drawn from.
 enum Part { kAll = 0, kPlus = 1, kMinus = 2, kUnjudgedPart = 3 };
 inline constexpr int kDrawnParts = 3;
 inline constexpr int kAllParts = 4;
@@ -21,13 +21,14 @@ inline constexpr int kAllParts = 4;
 //   advantage    NaN          > 0       0            < 0
 //   parts        D, unjudged  D, D+     D, D+, D-    D, D-
 //
-// Knows slots and advantages, not rows. Every operation is O(1). Thread-compatible: the buffer's mutex guards
-// it.
+// With a margin above 0 a row with an advantage of 0 is not in D-, and one between -margin and 0 is in D
+// alone. Knows slots and advantages, not rows. Every operation is O(1). Thread-compatible: the buffer's mutex
+// guards it.
 class Partitions {
  public:
   // All parts are empty. `capacity`: slots of the store.
-  explicit Partitions(std::uint32_t capacity)
-      : parts_{SlotSet(capacity), SlotSet(capacity), SlotSet(capacity), SlotSet(capacity)} {}
+  explicit Partitions(std::uint32_t capacity, float margin = 0)
+      : margin_(margin), parts_{SlotSet(capacity), SlotSet(capacity), SlotSet(capacity), SlotSet(capacity)} {}
 
   // A row with its advantage (NaN: not yet judged) enters, leaves, or has its advantage changed from
   // `old_advantage`.
@@ -54,9 +55,9 @@ class Partitions {
 
  private:
   // The parts beside D that a row of that advantage lies in, as bits.
-  static unsigned Code(float advantage) {
+  unsigned Code(float advantage) const {
     if (std::isnan(advantage)) return 1u << kUnjudgedPart;
-    return (advantage >= 0 ? 1u << kPlus : 0) | (advantage <= 0 ? 1u << kMinus : 0);
+    return (advantage >= 0 ? 1u << kPlus : 0) | (advantage <= -margin_ ? 1u << kMinus : 0);
   }
   void Join(std::uint32_t slot, float advantage, Source source) {
     for (int part = kPlus; part < kAllParts; ++part) {
@@ -73,6 +74,7 @@ class Partitions {
     }
   }
 
+  const float margin_;
   std::array<SlotSet, kAllParts> parts_;
   std::array<std::uint64_t, kAllParts> seed_buffer_{};
 };

@@ -25,6 +25,7 @@ ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& la
                              : 0.1 * static_cast<double>(replay.capacity()) * replay.samples_per_insert();
   options.buffer.limiter.min_size = replay.min_size();
   options.buffer.cumulative_advantage = config.algorithm().dbr().advantage() == DbrConfig::ARM_CUMULATIVE;
+  options.buffer.minus_margin = config.algorithm().dbr().minus_margin();
   options.buffer.seed = config.seed();
   options.buffer.seed_buffer_share = replay.seed_buffer().share();
   options.seed_buffer = SeedBufferOptionsFrom(config);

@@ -65,6 +65,7 @@ constexpr Effect kEffects[] = {
      "multiplier_learning_rate: 0.1 constraint: FIXED epsilon: 1e-6"},
     {"dbr", "updates_per_policy_update", "updates_per_policy_update: 3"},
     {"dbr", "behavior_data", "behavior_data: BATCH"},
+    {"dbr", "minus_margin", "minus_margin: 0.5", "behavior_data: BATCH"},  // PARTITIONS: the replay server's
 
     {"sac", "first_temperature", "first_temperature: 0.1"},
     {"sac", "temperature_learning_rate", "temperature_learning_rate: 0.1"},

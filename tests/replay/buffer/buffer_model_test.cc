@@ -55,7 +55,8 @@ struct Model {
     }
   }
   bool InPart(const Row& row, int part) const {
-    return part == kAll || (part == kPlus && row.advantage >= 0) || (part == kMinus && row.advantage <= 0) ||
+    return part == kAll || (part == kPlus && row.advantage >= 0) ||
+           (part == kMinus && row.advantage <= -margin) ||
            (part == kUnjudgedPart && std::isnan(row.advantage));
   }
   std::uint64_t Size(int part) const {
@@ -68,16 +69,18 @@ struct Model {
   }
 
   bool cumulative = false;
+  float margin = 0;  // of D-
   std::deque<Row> rows;
   std::map<int, std::uint64_t> last_sequence;
   std::uint64_t inserted = 0, duplicates = 0, relabelled = 0, relabel_evicted = 0, relabel_stale = 0;
 };
 
-// Parameters: seed, cumulative advantages.
-class BufferAgainstModel : public ::testing::TestWithParam<std::tuple<int, bool>> {
+// Parameters: seed, cumulative advantages, the margin of D-.
+class BufferAgainstModel : public ::testing::TestWithParam<std::tuple<int, bool, float>> {
  protected:
   BufferAgainstModel() : rng_(static_cast<std::uint64_t>(std::get<0>(GetParam()))) {
     model_.cumulative = std::get<1>(GetParam());
+    model_.margin = std::get<2>(GetParam());
     store_options_.path = absl::StrCat(folder_.path(), "/replay.store");
     store_options_.env = "connect4";
     store_options_.layout = kSmallLayout;
@@ -91,6 +94,7 @@ class BufferAgainstModel : public ::testing::TestWithParam<std::tuple<int, bool>
     ASSERT_TRUE(store.ok()) << store.status();
     BufferOptions options;
     options.cumulative_advantage = model_.cumulative;
+    options.minus_margin = model_.margin;
     options.seed = rng_();
     auto buffer = PartitionedBuffer::Make(std::move(*store), options);
     ASSERT_TRUE(buffer.ok()) << buffer.status();
@@ -205,7 +209,8 @@ TEST_P(BufferAgainstModel, AgreesAfterEveryStep) {
   }
 }
 INSTANTIATE_TEST_SUITE_P(Seeds, BufferAgainstModel,
-                         ::testing::Combine(::testing::Values(1, 2, 3), ::testing::Bool()));
+                         ::testing::Combine(::testing::Values(1, 2, 3), ::testing::Bool(),
+                                            ::testing::Values(0.0f, 1.0f)));
 
 // Writers, a learner that draws and relabels, and a watcher, all at once, with the limiter between them.
 TEST(BufferUnderThreads, KeepsItsPromises) {
