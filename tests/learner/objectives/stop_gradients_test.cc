@@ -130,8 +130,11 @@ TEST_P(StopGradients, ThePolicysLossMovesThePolicyAlone) {
               UnorderedElementsAre("policy"));
   EXPECT_THAT(MovedByConfig([](DbrConfig* config) { config->set_normalize_q(true); }),
               UnorderedElementsAre("policy"));
+}
+
+TEST_P(StopGradients, AWarmStartHoldsTheMultiplierToo) {
   EXPECT_THAT(MovedByConfig([](DbrConfig* config) { config->set_warm_start_updates(10); }),
-              UnorderedElementsAre("policy"));
+              UnorderedElementsAre("policy", "log_alpha"));
 }
 
 TEST_P(StopGradients, TheMultiplierWeighsThePolicysConstraintAndNothingElse) {

@@ -55,7 +55,7 @@ double Objective(const Grid& grid, const PolicyLoss<double>& moved, const Policy
   const auto [constraint, divergence, repel_negative, normalize_q] = grid;
   const bool dynamic = constraint == DbrConfig::DYNAMIC_MAX || constraint == DbrConfig::DYNAMIC_MIN;
   const double threshold = dynamic && repel_negative ? moved.divergence_minus : at.threshold;
-  return -moved.value / (normalize_q ? scale : 1) - kEntropyWeight * moved.entropy +
+  return -(moved.value + kEntropyWeight * moved.entropy) / (normalize_q ? scale : 1) +
          AlphaOf(grid) * (moved.divergence_plus - threshold);
 }
 
