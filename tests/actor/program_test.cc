@@ -220,7 +220,7 @@ TEST_F(ProgramTest, EvaluatorReportsToTheLearnerUntilItIsStopped) {
 }
 
 TEST_F(ProgramTest, EvaluatorPlaysTheAverageUnlessTheConfigSaysRaw) {
-  const std::string evaluation = "episodes: 50 every_s: 1000000 opponents: 'random'";
+  const std::string evaluation = "episodes: 50 every_s: 1000000 every_updates: 20 opponents: 'random'";
   const PolicySnapshot raw = UntrainedSnapshot(Connect4Spec(), 3);
   const PolicySnapshot both = WithAverage(raw, UntrainedSnapshot(Connect4Spec(), 4));
   const std::string best = folder_.path() + "/policy/best.safetensors";
