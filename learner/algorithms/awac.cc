@@ -52,7 +52,7 @@ void Awac<Scalar>::ComputeValue(const BasicBatch<Scalar>& batch) {
 template <class Scalar>
 Scalar Awac<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
   const Eigen::Index n = batch.size();
-  TwinCritic<Scalar>& critics = networks_.critics;
+  CriticEnsemble<Scalar>& critics = networks_.critics;
   next_pi_.Split(networks_.policy.Evaluate(batch.next_observations), kBehaviorLogStd);
   FillNormal(networks_.rng, networks_.spec.actions.size, n, &next_noise_);
   next_draws_.DrawActions(next_pi_, next_noise_);
@@ -65,7 +65,7 @@ Scalar Awac<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
 template <class Scalar>
 double Awac<Scalar>::UpdateFlops() const {
   const Eigen::Index n = this->needs().uniform;
-  const TwinCritic<Scalar>& critics = networks_.critics;
+  const CriticEnsemble<Scalar>& critics = networks_.critics;
   const MlpShape& policy = networks_.policy.shape();
   return critics.TargetFlops(n) + critics.TargetFlops(n * config().value_samples()) + critics.FitFlops(n) +
          2 * policy.ForwardFlops(n) + policy.ParameterGradientFlops(n);

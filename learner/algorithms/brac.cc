@@ -47,7 +47,7 @@ absl::Status Brac<Scalar>::Update(const BasicBatch<Scalar>& uniform, const Basic
 template <class Scalar>
 void Brac<Scalar>::ComputeNextValue(const BasicBatch<Scalar>& batch) {
   const Eigen::Index n = batch.size();
-  TwinCritic<Scalar>& critics = networks_.critics;
+  CriticEnsemble<Scalar>& critics = networks_.critics;
   FillNormal(networks_.rng, networks_.spec.actions.size, n, &next_noise_);
   next_draws_.DrawActions(next_pi_, next_noise_);
   critics.EvaluateTargets(next_draws_.CriticInput(batch.next_observations));
@@ -77,7 +77,7 @@ BehaviorKlLoss<Scalar> Brac<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& bat
 template <class Scalar>
 double Brac<Scalar>::UpdateFlops() const {
   const Eigen::Index n = this->needs().uniform;
-  const TwinCritic<Scalar>& critics = networks_.critics;
+  const CriticEnsemble<Scalar>& critics = networks_.critics;
   const MlpShape& policy = networks_.policy.shape();
   // pi and beta at s, and pi' at s'. VP evaluates beta at s' too.
   const int forward = config().variant() == BracConfig::VP ? 4 : 3;

@@ -74,7 +74,7 @@ ConstrainedLoss<Scalar> ContinuousBear<Scalar>::ImprovePolicy(const BasicBatch<S
 template <class Scalar>
 double ContinuousBear<Scalar>::UpdateFlops() const {
   const Eigen::Index n = this->needs().uniform;
-  const TwinCritic<Scalar>& critics = networks_.critics;
+  const CriticEnsemble<Scalar>& critics = networks_.critics;
   const MlpShape& policy = networks_.policy.shape();
   return vae_.shape().GradientFlops(n) + vae_.shape().DecodeFlops(n * config().divergence_samples()) +
          critics.TargetFlops(n * config().target_samples()) + critics.FitFlops(n) +

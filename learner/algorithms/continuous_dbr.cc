@@ -124,7 +124,7 @@ void ContinuousDbr<Scalar>::JudgeAndImitate(const BasicBatch<Scalar>& batch) {
 template <class Scalar>
 double ContinuousDbr<Scalar>::UpdateFlops() const {
   const Eigen::Index n = this->needs().uniform;
-  const TwinCritic<Scalar>& critics = networks_.critics;
+  const CriticEnsemble<Scalar>& critics = networks_.critics;
   return critics.TargetFlops(n * config().target_samples()) + critics.FitFlops(n) +
          critics.InputGradientFlops(n * config().policy_samples()) + networks_.PolicyFlops();
 }

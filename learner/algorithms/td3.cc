@@ -36,7 +36,7 @@ absl::Status Td3<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicB
 template <class Scalar>
 Scalar Td3<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
   const Eigen::Index n = batch.size();
-  TwinCritic<Scalar>& critics = networks_.critics;
+  CriticEnsemble<Scalar>& critics = networks_.critics;
   next_pi_.Split(networks_.policy.ForwardTarget(batch.next_observations), kPolicyLogStd);
   FillNormal(networks_.rng, networks_.spec.actions.size, n, &noise_);
   SmoothedActions<Scalar>(next_pi_.mean(), noise_, {config().target_noise(), config().target_noise_limit()},
@@ -51,7 +51,7 @@ Scalar Td3<Scalar>::FitCritics(const BasicBatch<Scalar>& batch) {
 
 template <class Scalar>
 Scalar Td3<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
-  TwinCritic<Scalar>& critics = networks_.critics;
+  CriticEnsemble<Scalar>& critics = networks_.critics;
   pi_.Split(networks_.policy.Forward(batch.observations), kPolicyLogStd);
   const Scalar loss = objective_.Evaluate(pi_, batch.observations, &critics);
   value_.resize(batch.size());
@@ -66,7 +66,7 @@ Scalar Td3<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
 template <class Scalar>
 double Td3<Scalar>::UpdateFlops() const {
   const Eigen::Index n = this->needs().uniform;
-  const TwinCritic<Scalar>& critics = networks_.critics;
+  const CriticEnsemble<Scalar>& critics = networks_.critics;
   const MlpShape& policy = networks_.policy.shape();
   const double delayed = critics.FirstInputGradientFlops(n) + policy.ParameterGradientFlops(n);
   // The targets of the critics at s' and the critics at pi(s) cost the same. The policy is evaluated as pi'

@@ -26,7 +26,7 @@ class BearObjective {
   // options.use_q false the first term is 0. `d_output` [2 * dimensions x n] becomes the gradient with
   // respect to the output of pi's network. The critics' weights, beta's samples and alpha are constants.
   ConstrainedLoss<Scalar> Compute(const PolicyLossOptions& options, const BearDraws<Scalar>& at, Scalar alpha,
-                                  TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output) {
+                                  CriticEnsemble<Scalar>* critics, MatrixX<Scalar>* d_output) {
     const GaussianHead<Scalar>& pi = at.policy.pi;
     const SoftPolicyLoss<Scalar> q =
         q_objective_.Compute({.q = {.use_q = options.use_q}}, at.policy, critics, &gradient_);

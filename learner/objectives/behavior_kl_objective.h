@@ -3,7 +3,7 @@
 
 #include "learner/objectives/continuous_losses.h"
 #include "learner/objectives/sampled_actions.h"
-#include "learner/training/twin_critic.h"
+#include "learner/training/critic_ensemble.h"
 #include "nn/divergence.h"
 
 namespace dbr {
@@ -34,7 +34,7 @@ class BehaviorKlObjective {
   // which flows through the draws. beta, the critics' weights and alpha are constants. With use_q false the
   // first term is 0.
   BehaviorKlLoss<Scalar> Compute(const BehaviorKlInputs<Scalar>& inputs, const MatrixX<Scalar>& observations,
-                                 Scalar alpha, bool use_q, TwinCritic<Scalar>* critics,
+                                 Scalar alpha, bool use_q, CriticEnsemble<Scalar>* critics,
                                  MatrixX<Scalar>* d_output) {
     const Eigen::Index n = observations.cols();
     draws_.Draw(inputs.pi, inputs.noise);

@@ -1,10 +1,10 @@
-// The step of the twin critics that all algorithms over continuous actions share.
+// The step of the critics that all algorithms over continuous actions share.
 #pragma once
 
 #include "core/batch.h"
 #include "learner/objectives/continuous_losses.h"
 #include "learner/objectives/critic_target.h"
-#include "learner/training/twin_critic.h"
+#include "learner/training/critic_ensemble.h"
 
 namespace dbr {
 
@@ -16,7 +16,7 @@ class CriticRegression {
   // V'(s') is a constant. next_value [n] is V'(s'). With `bonus` [n] the rewards are r + bonus. Returns the
   // mean of the two losses. The batch must not be empty.
   Scalar Fit(const BasicBatch<Scalar>& batch, double reward_scale, const VectorX<Scalar>& next_value,
-             TwinCritic<Scalar>* critics, const VectorX<Scalar>* bonus = nullptr) {
+             CriticEnsemble<Scalar>* critics, const VectorX<Scalar>* bonus = nullptr) {
     CriticTarget(batch, reward_scale, next_value, &target_);
     if (bonus != nullptr) target_ += static_cast<Scalar>(reward_scale) * *bonus;
     inputs_.resize(batch.observations.rows() + batch.actions.rows(), batch.size());

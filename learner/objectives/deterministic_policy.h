@@ -4,7 +4,7 @@
 
 #include "learner/objectives/continuous_losses.h"
 #include "learner/objectives/sampled_actions.h"
-#include "learner/training/twin_critic.h"
+#include "learner/training/critic_ensemble.h"
 
 namespace dbr {
 
@@ -45,7 +45,7 @@ class DeterministicPolicyObjective {
   // Returns -E[Q_1(s, tanh(mean(s)))] (Fujimoto et al. 2018, algorithm 1; Silver et al. 2014). Both critics
   // are evaluated: value1() and value2() of `critics` are then their values at the policy's actions.
   Scalar Evaluate(const GaussianHead<Scalar>& pi, const MatrixX<Scalar>& observations,
-                  TwinCritic<Scalar>* critics) {
+                  CriticEnsemble<Scalar>* critics) {
     noise_.setZero(pi.mean().rows(), pi.mean().cols());
     draws_.DrawActions(pi, noise_);
     critics->Evaluate(draws_.CriticInput(observations));
@@ -54,7 +54,7 @@ class DeterministicPolicyObjective {
 
   // Sets `d_output` [2 * dimensions x n] to the gradient of the newest Evaluate with respect to the output of
   // the policy's network. It is 0 for the log-stds. The critic's weights are constants.
-  void Gradient(const GaussianHead<Scalar>& pi, TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output) {
+  void Gradient(const GaussianHead<Scalar>& pi, CriticEnsemble<Scalar>* critics, MatrixX<Scalar>* d_output) {
     const Eigen::Index n = pi.mean().cols();
     d_q_.setConstant(1, n, Scalar{-1} / static_cast<Scalar>(n));
     d_log_prob_.setZero(n);

@@ -7,7 +7,7 @@ PolicyLoss<Scalar> DualBehaviorObjective<Scalar>::Compute(const PolicyLossOption
                                                           const PolicyHeads<Scalar>& heads,
                                                           const MatrixX<Scalar>& observations,
                                                           const ObjectiveNoise<Scalar>& noise, Scalar alpha,
-                                                          TwinCritic<Scalar>* critics,
+                                                          CriticEnsemble<Scalar>* critics,
                                                           MatrixX<Scalar>* d_output) {
   PolicyLoss<Scalar> result;
   const SoftPolicyLoss<Scalar> at_draws =

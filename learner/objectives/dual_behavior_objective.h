@@ -5,7 +5,7 @@
 #include "learner/objectives/dual_behavior.h"
 #include "learner/objectives/gaussian_divergence.h"
 #include "learner/objectives/sampled_q_objective.h"
-#include "learner/training/twin_critic.h"
+#include "learner/training/critic_ensemble.h"
 
 namespace dbr {
 
@@ -36,16 +36,16 @@ class DualBehaviorObjective {
   // normalize_q's scale are constants. c is a constant too, unless repel_negative is set.
   PolicyLoss<Scalar> Compute(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
                              const MatrixX<Scalar>& observations, const ObjectiveNoise<Scalar>& noise,
-                             Scalar alpha, TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output);
+                             Scalar alpha, CriticEnsemble<Scalar>* critics, MatrixX<Scalar>* d_output);
 
   // Evaluates the critics at draws from pi, for StateValue alone.
-  void Evaluate(const PolicyDraws<Scalar>& at, TwinCritic<Scalar>* critics) {
+  void Evaluate(const PolicyDraws<Scalar>& at, CriticEnsemble<Scalar>* critics) {
     q_objective_.Evaluate(at, critics);
   }
 
   // Sets `value` [n] to V(s): the mean of the smaller twin over the draws of the newest Compute or Evaluate.
   // Requires that `value` has its size n.
-  void StateValue(const TwinCritic<Scalar>& critics, VectorX<Scalar>* value) const {
+  void StateValue(const CriticEnsemble<Scalar>& critics, VectorX<Scalar>* value) const {
     MeanOfSmaller<Scalar>(critics.value1(), critics.value2(), value);
   }
 

@@ -5,8 +5,8 @@
 
 #include "learner/objectives/continuous_losses.h"
 #include "learner/objectives/sampled_actions.h"
+#include "learner/training/critic_ensemble.h"
 #include "learner/training/trained_network.h"
-#include "learner/training/twin_critic.h"
 
 namespace dbr {
 
@@ -23,7 +23,7 @@ class GreatestTarget {
   // draws from pi' (Kumar et al. 2019, algorithm 1). With a temperature it is the greatest value of that less
   // temperature * log pi'(a'|s'). noise [dimensions x count * n]. No gradient is taken.
   const VectorX<Scalar>& Compute(const MatrixX<Scalar>& next_observations, const MatrixX<Scalar>& noise,
-                                 Scalar min_weight, TwinCritic<Scalar>* critics,
+                                 Scalar min_weight, CriticEnsemble<Scalar>* critics,
                                  std::optional<Scalar> temperature = std::nullopt) {
     if (temperature) {
       draws_.Draw(pi_, noise);

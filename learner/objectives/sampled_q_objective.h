@@ -4,7 +4,7 @@
 #include "learner/objectives/continuous_losses.h"
 #include "learner/objectives/sampled_actions.h"
 #include "learner/objectives/soft_policy_loss.h"
-#include "learner/training/twin_critic.h"
+#include "learner/training/critic_ensemble.h"
 
 namespace dbr {
 
@@ -27,7 +27,7 @@ template <class Scalar>
 class SampledQObjective {
  public:
   // Evaluates the critics at draws from pi, without a loss.
-  void Evaluate(const PolicyDraws<Scalar>& at, TwinCritic<Scalar>* critics) {
+  void Evaluate(const PolicyDraws<Scalar>& at, CriticEnsemble<Scalar>* critics) {
     draws_.Draw(at.pi, at.noise);
     critics->Evaluate(draws_.CriticInput(at.observations));
   }
@@ -37,7 +37,7 @@ class SampledQObjective {
   // respect to pi's parameters. The critics' weights, entropy_weight and the scale (SmallerMeanQTerm) are
   // constants.
   SoftPolicyLoss<Scalar> Compute(const SampledQOptions<Scalar>& options, const PolicyDraws<Scalar>& at,
-                                 TwinCritic<Scalar>* critics, GaussianGradient<Scalar>* gradient) {
+                                 CriticEnsemble<Scalar>* critics, GaussianGradient<Scalar>* gradient) {
     const Eigen::Index n = at.observations.cols();
     Evaluate(at, critics);
     SmallerMeanQTerm<Scalar>(options.q, critics->value1(), critics->value2(), n, &q_term_);

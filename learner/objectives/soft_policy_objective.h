@@ -3,7 +3,7 @@
 
 #include "learner/objectives/sampled_q_objective.h"
 #include "learner/objectives/soft_policy_loss.h"
-#include "learner/training/twin_critic.h"
+#include "learner/training/critic_ensemble.h"
 
 namespace dbr {
 
@@ -16,7 +16,7 @@ class SoftPolicyObjective {
   // with respect to the output of pi's network. The critics' weights and the temperature are constants.
   SoftPolicyLoss<Scalar> Compute(const GaussianHead<Scalar>& pi, const MatrixX<Scalar>& observations,
                                  const MatrixX<Scalar>& noise, Scalar temperature,
-                                 TwinCritic<Scalar>* critics, MatrixX<Scalar>* d_output) {
+                                 CriticEnsemble<Scalar>* critics, MatrixX<Scalar>* d_output) {
     const SoftPolicyLoss<Scalar> loss =
         q_objective_.Compute({.entropy_weight = temperature}, {pi, observations, noise}, critics, &gradient_);
     pi.Join(gradient_, d_output);
@@ -24,7 +24,7 @@ class SoftPolicyObjective {
   }
 
   // Evaluates the critics at draws from pi, without a loss.
-  void Evaluate(const PolicyDraws<Scalar>& at, TwinCritic<Scalar>* critics) {
+  void Evaluate(const PolicyDraws<Scalar>& at, CriticEnsemble<Scalar>* critics) {
     q_objective_.Evaluate(at, critics);
   }
 

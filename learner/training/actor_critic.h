@@ -1,6 +1,6 @@
-// What every actor-critic trains and keeps, with any loss: a policy with its Polyak average, critics, a random
-// generator, a counter, and the advantages of the newest update. An algorithm holds one of these, or a struct
-// that derives from it and adds networks.
+// What every actor-critic trains and keeps, with any loss: a policy with its Polyak average, critics, a
+// random generator, a counter, and the advantages of the newest update. An algorithm holds one of these, or a
+// struct that derives from it and adds networks.
 #pragma once
 
 #include <cstdint>
@@ -11,12 +11,12 @@
 #include "absl/status/status.h"
 #include "core/rng.h"
 #include "learner/algorithm.h"
+#include "learner/training/critic_ensemble.h"
 #include "learner/training/learning_rate.h"
 #include "learner/training/pair_runner.h"
 #include "learner/training/policy_export.h"
 #include "learner/training/tensor_state.h"
 #include "learner/training/trained_network.h"
-#include "learner/training/twin_critic.h"
 #include "nn/policy_networks.h"
 
 namespace dbr {
@@ -94,7 +94,7 @@ struct ActorCritic {
   Rng rng;
   PairRunner runner;
   TrainedNetwork<Scalar> policy;
-  TwinCritic<Scalar> critics;
+  CriticEnsemble<Scalar> critics;
   std::uint64_t updates = 0;      // that are complete
   std::vector<float> advantages;  // [n] for the newest update's uniform batch
 };

@@ -32,10 +32,10 @@ class PolicyLossTest : public testing::Test {
  protected:
   Rng rng_{31};
   PairRunner runner_{1};
-  TwinCritic<double> critics_{MlpShape(kObservation + kDimensions, {6, 6}, 1),
-                              {.learning_rate = 1e-3, .with_target = true},
-                              rng_,
-                              &runner_};
+  CriticEnsemble<double> critics_{MlpShape(kObservation + kDimensions, {6, 6}, 1),
+                                  {.learning_rate = 1e-3, .with_target = true},
+                                  rng_,
+                                  &runner_};
   const Matrix observations_ = Normal(kObservation, kStates, rng_);
   const Matrix output_ = 0.5 * Normal(2 * kDimensions, kStates, rng_);
 };

@@ -119,8 +119,8 @@ TEST(SmallerMeanQTermTest, HasItsGradientsAndLeavesTheScaleConstant) {
 TEST(SoftPolicyObjectiveTest, GradientMatchesDifferences) {
   Rng rng(8);
   PairRunner runner(1);
-  TwinCritic<double> critics(MlpShape(kObservation + kDimensions, {6, 6}, 1),
-                             {.learning_rate = 1e-3, .with_target = true}, rng, &runner);
+  CriticEnsemble<double> critics(MlpShape(kObservation + kDimensions, {6, 6}, 1),
+                                 {.learning_rate = 1e-3, .with_target = true}, rng, &runner);
   const Matrix observations = Normal(kObservation, kStates, rng), noise = Normal(kDimensions, kStates, rng);
   const Matrix output = 0.5 * Normal(2 * kDimensions, kStates, rng);
   SoftPolicyObjective<double> objective;
@@ -141,8 +141,8 @@ class BearObjectiveTest : public testing::TestWithParam<DbrConfig::Divergence> {
 TEST_P(BearObjectiveTest, GradientMatchesDifferences) {
   Rng rng(6);
   PairRunner runner(1);
-  TwinCritic<double> critics(MlpShape(kObservation + kDimensions, {6, 6}, 1),
-                             {.learning_rate = 1e-3, .with_target = true}, rng, &runner);
+  CriticEnsemble<double> critics(MlpShape(kObservation + kDimensions, {6, 6}, 1),
+                                 {.learning_rate = 1e-3, .with_target = true}, rng, &runner);
   const Matrix observations = Normal(kObservation, kStates, rng);
   const Matrix actions = Normal(kDimensions, kDraws * kStates, rng);
   const Matrix noise = Normal(kDimensions, kDivergenceSamples * kStates, rng);
@@ -217,7 +217,7 @@ class ObjectiveTest : public testing::TestWithParam<Case> {
 
   Rng rng_{5};
   PairRunner runner_{1};
-  TwinCritic<double> critics_;
+  CriticEnsemble<double> critics_;
   DualBehaviorObjective<double> objective_;
   GaussianHead<double> plus_, minus_;
   ObjectiveNoise<double> noise_;

@@ -107,8 +107,8 @@ TEST_P(ContinuousLoss, GradientAgreesWithDifferences) {
   constexpr int kObservation = 3, kDimensions = 2, kDraws = 3;
   Rng rng(32);
   PairRunner runner(1);
-  TwinCritic<double> critics(MlpShape(kObservation + kDimensions, {6, 6}, 1),
-                             {.learning_rate = 1e-3, .with_target = true}, rng, &runner);
+  CriticEnsemble<double> critics(MlpShape(kObservation + kDimensions, {6, 6}, 1),
+                                 {.learning_rate = 1e-3, .with_target = true}, rng, &runner);
   const Matrix observations = Normal(kObservation, kStates, rng);
   const auto noise = [&] { return Normal(kDimensions, kDraws * kStates, rng); };
   const ObjectiveNoise<double> draws{noise(), noise(), noise(), noise()};

@@ -27,11 +27,11 @@ struct CriticCounts {
 // trains all: the first two, or a pair that ChooseTwins draws (Chen et al. 2021). With asked = 1 both twins
 // are the same critic. One thread at a time.
 template <class Scalar>
-class TwinCritic {
+class CriticEnsemble {
  public:
   // `options` asks for targets. `runner` must outlive the critics.
-  TwinCritic(const MlpShape& shape, const TrainingOptions& options, Rng& rng, PairRunner* runner,
-             const CriticCounts& counts = {})
+  CriticEnsemble(const MlpShape& shape, const TrainingOptions& options, Rng& rng, PairRunner* runner,
+                 const CriticCounts& counts = {})
       : runner_(runner), asked_(static_cast<std::size_t>(counts.asked)) {
     critics_.reserve(static_cast<std::size_t>(counts.critics));
     for (int i = 0; i < counts.critics; ++i) {
