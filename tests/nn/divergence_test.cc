@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "core/rng.h"
+#include "nn/gaussian_head.h"
 #include "nn/tanh_gaussian.h"
 #include "tests/nn/gaussian_cases.h"
 
@@ -250,6 +252,60 @@ TEST(SampledKlTest, TheMeanOfManyDrawsIsTheExactKl) {
   SampledKl<double>(p.view(), q.view(), Normals(2, kDraws, rng), &kl, nullptr);
   const double exact = KlSum(p, q);
   EXPECT_NEAR(kl[0], exact, 0.03 * (1 + exact));
+}
+
+TEST(SquaredMmdTest, IsTheSquareOfTheExactMmd) {
+  Rng rng(12);
+  const Gaussian p = RandomGaussian(3, 4, rng), q = RandomGaussian(3, 4, rng);
+  Vector root, squared;
+  GaussianGradient<double> of_root, of_square;
+  ExactMmd<double>(p.view(), q.view(), 0.7, &root, &of_root);
+  SquaredMmd<double>(p.view(), q.view(), 0.7, &squared, &of_square);
+  ExpectNear(squared, (root.array().square() - kMmdFloor).matrix());
+  for (int j = 0; j < 4; ++j) {
+    ExpectNear(of_square.mean.col(j), 2 * root[j] * of_root.mean.col(j));
+    ExpectNear(of_square.log_std.col(j), 2 * root[j] * of_root.log_std.col(j));
+  }
+}
+
+// The root's gradient keeps its length down to a small distance; the square's does not.
+TEST(SquaredMmdTest, ItsGradientVanishesWhereThePoliciesAreEqual) {
+  Rng rng(13);
+  const Gaussian p = RandomGaussian(2, 3, rng);
+  Vector squared;
+  GaussianGradient<double> gradient;
+  SquaredMmd<double>(p.view(), p.view(), 1, &squared, &gradient);
+  EXPECT_TRUE(squared.isZero(1e-12));
+  EXPECT_TRUE(gradient.mean.isZero(1e-12));
+  EXPECT_TRUE(gradient.log_std.isZero(1e-12));
+}
+
+TEST(SquaredCategoricalMmdTest, IsTheSquareOfTheCategoricalMmd) {
+  const Matrix p = (Matrix(3, 2) << 0.2, 0.5, 0.3, 0.5, 0.5, 0).finished(),
+               q = (Matrix(3, 2) << 0.6, 0.5, 0.1, 0.25, 0.3, 0.25).finished();
+  Vector root, squared;
+  Matrix of_root, of_square;
+  CategoricalMmd<double>(p, q, 0.7, &root, &of_root);
+  SquaredCategoricalMmd<double>(p, q, 0.7, &squared, &of_square);
+  ExpectNear(squared, (root.array().square() - kMmdFloor).matrix());
+  for (int j = 0; j < 2; ++j) ExpectNear(of_square.col(j), 2 * root[j] * of_root.col(j));
+}
+
+TEST(GaussianHeadTest, AClippedLogStdPassesTheGradientThatLeadsBack) {
+  const LogStdLimits limits{-5, 2};
+  const Matrix output = (Matrix(2, 6) << 0, 0, 0, 0, 0, 0, 3, 3, -6, -6, 1, 3).finished();
+  GaussianHead<double> head;
+  head.Split(output, limits);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const GaussianGradient<double> gradient{Matrix::Ones(1, 6),
+                                          (Matrix(1, 6) << 1, -1, 1, -1, -1, nan).finished()};
+  Matrix d_output;
+  head.Join(gradient, &d_output);
+  EXPECT_EQ(d_output.row(0), gradient.mean);
+  // A step goes against the gradient: from above the limits it leads back where the gradient is above 0.
+  const Matrix expected = (Matrix(1, 5) << 1, 0, 0, -1, -1).finished();
+  EXPECT_EQ(d_output.block(1, 0, 1, 5), expected);
+  EXPECT_TRUE(std::isnan(d_output(1, 5)));
 }
 
 }  // namespace

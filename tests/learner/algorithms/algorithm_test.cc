@@ -57,6 +57,26 @@ constexpr Variant kVariants[] = {
        dbr->set_munchausen_weight(0.9);
        dbr->set_entropy_weight(0.1);
      }},
+    {"Online", "dbr",
+     [](AlgorithmSpec* spec) {
+       DbrConfig* dbr = spec->config.mutable_dbr();
+       dbr->set_first_temperature(0.5);
+       dbr->set_repel_negative(true);
+       dbr->set_min_multiplier(0);
+       dbr->set_updates_per_policy_update(3);
+       spec->config.set_critics(4);
+     }},
+    {"OfTheBatch", "dbr",
+     [](AlgorithmSpec* spec) {
+       spec->config.mutable_dbr()->set_behavior_data(DbrConfig::BATCH);
+       spec->config.set_critics(1);
+       spec->config.set_target_critics(1);
+     }},
+    {"Delayed", "sac",
+     [](AlgorithmSpec* spec) {
+       spec->config.mutable_sac()->set_updates_per_policy_update(3);
+       spec->config.set_critics(3);
+     }},
     {"Normalized", "dbr", [](AlgorithmSpec* spec) { spec->normalize_observations = true; }},
     {"Mirrored", "dbr",
      [](AlgorithmSpec* spec) {
@@ -90,6 +110,12 @@ std::vector<Member> Members() {
     }
   }
   return members;
+}
+
+// Updates after which every part of an algorithm has been at work: some policies move in every second or
+// third update alone, and with more than two critics each update asks a pair that is drawn.
+int EnoughUpdates(const Member& member) {
+  return member.variant == "Online" || member.variant == "Delayed" ? 20 : 4;
 }
 
 class Conformance : public testing::TestWithParam<Member> {
@@ -179,7 +205,7 @@ TEST_P(Conformance, AStateWithOtherwiseNormalisedCriticsIsRefusedByName) {
 TEST_P(Conformance, AnUpdateMovesEveryNetworkThatItExports) {
   PolicySnapshot before, after;
   algorithm_->ExportPolicy(&before);
-  Update(algorithm_.get());
+  for (int i = 0; i < EnoughUpdates(GetParam()); ++i) Update(algorithm_.get());
   algorithm_->ExportPolicy(&after);
   ASSERT_EQ(before.networks.size(), after.networks.size());
   for (std::size_t i = 0; i < before.networks.size(); ++i) {
@@ -236,7 +262,9 @@ TEST_P(Conformance, AnIllegalActionIsNeitherLearnedFromNorChosen) {
 
 TEST_P(Conformance, AnUpdateAllocatesNothing) {
   const Batch uniform = Random(16), plus = Random(16), minus = Random(16);
-  for (int i = 0; i < 2; ++i) ASSERT_TRUE(algorithm_->Update({uniform, plus, minus}).ok());
+  for (int i = 0; i < EnoughUpdates(GetParam()); ++i) {
+    ASSERT_TRUE(algorithm_->Update({uniform, plus, minus}).ok());
+  }
   if (!CountsAllocations()) GTEST_SKIP() << "allocations belong to the sanitizer in this build";
   const std::uint64_t before = AllocationCount();
   const bool ok = algorithm_->Update({uniform, plus, minus}).ok();
@@ -262,7 +290,6 @@ bool ReadsPolicyTarget(const std::string& algorithm) {
 // One NaN anywhere in the state (a network, a target, a moment of Adam, the multiplier) reaches the figures
 // of one of the next updates: nothing on the way takes the other, finite side.
 TEST_P(Conformance, ANaNInTheStateEndsTraining) {
-  constexpr int kEnough = 4;  // TD3's policy moves in every second update
   Update(algorithm_.get());
   const TensorFile sound = StateOf(*algorithm_);
   const bool multiplied = GetParam().variant != "Mrl" && GetParam().id.name != "brac";  // else it is constant
@@ -277,7 +304,7 @@ TEST_P(Conformance, ANaNInTheStateEndsTraining) {
       const auto algorithm = Make(1);
       ASSERT_TRUE(algorithm->Load(damaged).ok());
       absl::Status status;
-      for (int i = 0; i < kEnough && status.ok(); ++i) {
+      for (int i = 0; i < EnoughUpdates(GetParam()) && status.ok(); ++i) {
         const Batch uniform = Random(16), plus = Random(16), minus = Random(16);
         status = algorithm->Update({uniform, plus, minus});
       }
