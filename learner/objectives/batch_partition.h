@@ -6,8 +6,8 @@
 
 namespace dbr {
 
-// Sorts a batch by its newest advantages A: A >= 0 is in D+, A <= -margin in D-. Reused from batch to batch. One
-// thread at a time.
+// Sorts a batch by its newest advantages A: A >= 0 is in D+, A <= -margin in D-. Reused from batch to batch.
+// One thread at a time.
 template <class Scalar>
 class BatchPartition {
  public:

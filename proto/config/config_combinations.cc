@@ -26,7 +26,7 @@ void CheckTemperature(const DbrConfig& dbr, std::vector<std::string>* errors) {
   }
   const bool has_target = dbr.has_target_entropy() || dbr.has_target_entropy_ratio();
   if (dbr.constraint() == DbrConfig::NONE && !has_target) {
-    errors->push_back(
+    errors->emplace_back(
         "algorithm.dbr.target_entropy: expected a value where constraint is NONE and first_temperature is "
         "above 0 (or target_entropy_ratio for discrete actions), found none");
   }
@@ -42,7 +42,7 @@ void CheckDbr(const Config& config, std::vector<std::string>* errors) {
                                    "found ", dbr.max_repulsion(), " and repel_negative: false"));
   }
   if (dbr.behavior_data() == DbrConfig::BATCH && dbr.advantage() == DbrConfig::SIL) {
-    errors->push_back(
+    errors->emplace_back(
         "algorithm.dbr.behavior_data: expected PARTITIONS with advantage: SIL, which fits beta+ to the batch "
         "in its own way, found BATCH");
   }
