@@ -48,11 +48,13 @@ Scalar AddEntropyTerm(const Categorical<Scalar>& policy, Scalar weight, VectorX<
   return entropy->mean();
 }
 
-// The gradient of a state whose divergence [n] is above `limit` becomes 0.
+// Cuts each divergence [n] at `limit`. The gradient of a state beyond it becomes 0.
 template <class Scalar>
-void CutGradientAbove(Scalar limit, const VectorX<Scalar>& divergence, MatrixX<Scalar>* gradient) {
-  for (Eigen::Index j = 0; j < divergence.size(); ++j) {
-    if (divergence[j] > limit) gradient->col(j).setZero();
+void LimitDivergence(Scalar limit, VectorX<Scalar>* divergence, MatrixX<Scalar>* gradient) {
+  for (Eigen::Index j = 0; j < divergence->size(); ++j) {
+    if (!((*divergence)[j] > limit)) continue;
+    (*divergence)[j] = limit;
+    gradient->col(j).setZero();
   }
 }
 
@@ -158,17 +160,18 @@ PolicyLoss<Scalar> DualBehaviorPolicyLoss(const PolicyLossOptions& options, cons
                                           const Categorical<Scalar>& beta_plus,
                                           const Categorical<Scalar>& beta_minus, Scalar alpha,
                                           PolicyLossWorkspace<Scalar>* workspace, MatrixX<Scalar>* d_logits) {
-  Scalar divergence_minus = 0;
+  Scalar divergence_minus = 0, limited_minus = 0;
   if (IsMovedByMinus(options.constraint)) {
     Divergence(options.divergence, static_cast<Scalar>(options.mmd_sigma), policy, beta_minus,
                &workspace->minus, &workspace->d_minus);
     divergence_minus = workspace->minus.mean();
     if (options.limits_repulsion()) {
-      CutGradientAbove(static_cast<Scalar>(options.max_repulsion), workspace->minus, &workspace->d_minus);
+      LimitDivergence(static_cast<Scalar>(options.max_repulsion), &workspace->minus, &workspace->d_minus);
     }
+    limited_minus = workspace->minus.mean();
   }
   const Threshold<Scalar> threshold =
-      ThresholdOf(options.constraint, static_cast<Scalar>(options.epsilon), divergence_minus);
+      ThresholdOf(options.constraint, static_cast<Scalar>(options.epsilon), limited_minus);
   const Scalar weight = options.constraint == DbrConfig::NONE ? Scalar{0} : alpha;
   const ConstrainedLoss<Scalar> loss = ConstrainedPolicyLoss<Scalar>(
       options, {policy, q1, q2}, {beta_plus, threshold.value, weight}, workspace, d_logits);

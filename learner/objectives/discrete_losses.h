@@ -82,7 +82,7 @@ ConstrainedLoss<Scalar> ConstrainedPolicyLoss(const PolicyLossOptions& options,
 
 // Returns DBR's policy loss, -(E[min_i sum_a pi Q_i] + w H(pi)) / scale + alpha * (D(pi, beta+) - c).
 // options.constraint sets c (docs/algorithms.md, DBR step 3); NONE leaves that term out. With repel_negative
-// and a max_repulsion, states with a D(pi, beta-) above it count in c and not in its gradient. Sets
+// and a max_repulsion, the D(pi, beta-) of which c is the mean is cut at max_repulsion in each state. Sets
 // `d_logits` [actions x n] to the loss's gradient with respect to the policy's logits. q1 and q2 [actions x
 // n], beta+, beta-, alpha and the scale are constants. c is a constant too, unless repel_negative is set.
 template <class Scalar>

@@ -30,7 +30,7 @@ struct PolicyLossOptions {
   double epsilon = 0.05;
   double mmd_sigma = 1;
   bool repel_negative = false;
-  double max_repulsion = 0;  // the largest D(pi, beta-) of a state that still repels; 0 for no limit
+  double max_repulsion = 0;  // the largest D(pi, beta-) of a state that counts; 0 for no limit
   bool normalize_q = false;
   double entropy_weight = 0;  // of the policy's entropy in nats, in units of Q
   bool use_q = true;          // false during the warm start: neither Q nor the entropy is in the loss

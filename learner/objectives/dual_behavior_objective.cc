@@ -30,13 +30,15 @@ void DualBehaviorObjective<Scalar>::AddConstraint(const PolicyLossOptions& optio
   const GaussianDivergenceOptions kind{options.divergence, options.mmd_sigma};
   plus_.Compute(kind, heads.pi, heads.beta_plus, {noise.pi, noise.plus});
   result->divergence_plus = plus_.value().mean();
+  Scalar limited_minus = 0;
   if (IsMovedByMinus(options.constraint)) {
     minus_.Compute(kind, heads.pi, heads.beta_minus, {noise.pi, noise.minus});
     result->divergence_minus = minus_.value().mean();
-    if (options.limits_repulsion()) minus_.CutGradientAbove(static_cast<Scalar>(options.max_repulsion));
+    if (options.limits_repulsion()) minus_.LimitTo(static_cast<Scalar>(options.max_repulsion));
+    limited_minus = minus_.value().mean();
   }
   const Threshold<Scalar> threshold =
-      ThresholdOf(options.constraint, static_cast<Scalar>(options.epsilon), result->divergence_minus);
+      ThresholdOf(options.constraint, static_cast<Scalar>(options.epsilon), limited_minus);
   result->threshold = threshold.value;
   if (options.constraint == DbrConfig::NONE) return;
   result->loss += alpha * (result->divergence_plus - threshold.value);

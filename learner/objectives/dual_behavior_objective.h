@@ -30,8 +30,8 @@ class DualBehaviorObjective {
  public:
   // Returns -(E[min_i mean_k Q_i(s, a_k)] + w H(pi)) / scale + alpha * (D(pi, beta+) - c), with the a_k drawn
   // from pi. options.constraint sets c (docs/algorithms.md, DBR step 3); NONE leaves that term out. The
-  // entropy H is the estimate from the draws. With repel_negative and a max_repulsion, states with a
-  // D(pi, beta-) above it count in c and not in its gradient. `d_output` [2 * dimensions x n] becomes the
+  // entropy H is the estimate from the draws. With repel_negative and a max_repulsion, the D(pi, beta-) of
+  // which c is the mean is cut at max_repulsion in each state. `d_output` [2 * dimensions x n] becomes the
   // loss's gradient with respect to the output of pi's network. beta+, beta-, alpha, the critics' weights and
   // normalize_q's scale are constants. c is a constant too, unless repel_negative is set.
   PolicyLoss<Scalar> Compute(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,

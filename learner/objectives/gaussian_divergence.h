@@ -38,10 +38,11 @@ class GaussianDivergence {
   void ComputeFrom(const GaussianDivergenceOptions& options, const GaussianHead<Scalar>& pi,
                    const MatrixX<Scalar>& pi_noise, const MatrixX<Scalar>& beta_samples);
 
-  // The gradient of a state whose value is above `limit` becomes 0.
-  void CutGradientAbove(Scalar limit) {
+  // Replaces value() by min(value(), limit). The gradient of a state beyond the limit becomes 0.
+  void LimitTo(Scalar limit) {
     for (Eigen::Index j = 0; j < value_.size(); ++j) {
       if (!(value_[j] > limit)) continue;
+      value_[j] = limit;
       gradient_.mean.col(j).setZero();
       gradient_.log_std.col(j).setZero();
     }
