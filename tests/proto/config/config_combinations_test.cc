@@ -1,0 +1,147 @@
+// Tests that fields which contradict each other are refused when a config is read, each by its name and all
+// at once, and that what is printed is never refused.
+#include "proto/config/config_combinations.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "proto/config/config_file.h"
+
+namespace dbr {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+// Returns the errors, each from its field on. The list is empty where the config is accepted.
+std::vector<std::string> ErrorsOfAlgorithm(const std::string& settings) {
+  const auto config = ParseConfig(absl::StrCat("algorithm { ", settings, " }"));
+  if (config.ok()) return {};
+  EXPECT_TRUE(absl::IsInvalidArgument(config.status()));
+  const std::string message(config.status().message());
+  std::vector<std::string> lines;
+  for (std::size_t at = message.find("algorithm."); at != std::string::npos;) {
+    const std::size_t end = message.find('\n', at);
+    lines.push_back(message.substr(at, end == std::string::npos ? end : end - at));
+    at = end == std::string::npos ? end : message.find("algorithm.", end);
+  }
+  return lines;
+}
+std::vector<std::string> ErrorsOfDbr(const std::string& settings) {
+  return ErrorsOfAlgorithm(absl::StrCat("dbr { ", settings, " }"));
+}
+
+TEST(ConfigCombinations, NoMoreCriticsAreAskedThanThereAre) {
+  EXPECT_THAT(ErrorsOfAlgorithm("critics: 1"),
+              ElementsAre("algorithm.target_critics: expected at most algorithm.critics (1), found 2"));
+  EXPECT_THAT(ErrorsOfAlgorithm("critics: 1 sac {}"), ElementsAre(StartsWith("algorithm.target_critics")));
+  EXPECT_THAT(ErrorsOfAlgorithm("critics: 1 target_critics: 1"), ElementsAre());
+  EXPECT_THAT(ErrorsOfAlgorithm("critics: 4"), ElementsAre());
+}
+
+TEST(ConfigCombinations, TheMultiplierBeginsBetweenItsLimits) {
+  EXPECT_THAT(ErrorsOfDbr("first_multiplier: 3 max_multiplier: 2"),
+              ElementsAre(AllOf(StartsWith("algorithm.dbr.first_multiplier: expected min_multiplier ("),
+                                HasSubstr("to max_multiplier (2), found 3"))));
+  EXPECT_THAT(ErrorsOfDbr("first_multiplier: 0.1 min_multiplier: 0.5"),
+              ElementsAre(AllOf(StartsWith("algorithm.dbr.first_multiplier"), HasSubstr("found 0.1"))));
+  EXPECT_THAT(ErrorsOfDbr("max_multiplier: 0.5"), ElementsAre(HasSubstr("found 1")))
+      << "the default of first_multiplier";
+  EXPECT_THAT(ErrorsOfDbr("min_multiplier: 3 max_multiplier: 2"),
+              ElementsAre("algorithm.dbr.min_multiplier: expected at most max_multiplier (2), found 3"));
+  EXPECT_THAT(ErrorsOfDbr("min_multiplier: 0 first_multiplier: 2 max_multiplier: 2"), ElementsAre());
+}
+
+TEST(ConfigCombinations, TheEntropyHasOneWeight) {
+  EXPECT_THAT(ErrorsOfDbr("first_temperature: 1 entropy_weight: 0.1"),
+              ElementsAre(AllOf(StartsWith("algorithm.dbr.entropy_weight: expected 0"),
+                                HasSubstr("first_temperature"), HasSubstr("found 0.1"))));
+  EXPECT_THAT(ErrorsOfDbr("entropy_weight: 0.1"), ElementsAre());
+  EXPECT_THAT(ErrorsOfDbr("first_temperature: 1"), ElementsAre());
+}
+
+TEST(ConfigCombinations, ATemperatureAloneNamesItsTarget) {
+  EXPECT_THAT(ErrorsOfDbr("constraint: NONE first_temperature: 1"),
+              ElementsAre(AllOf(StartsWith("algorithm.dbr.target_entropy: expected a value"),
+                                HasSubstr("constraint is NONE"), HasSubstr("found none"))));
+  EXPECT_THAT(ErrorsOfDbr("constraint: NONE first_temperature: 1 target_entropy: -1"), ElementsAre());
+  EXPECT_THAT(ErrorsOfDbr("constraint: NONE first_temperature: 1 target_entropy_ratio: 0.5"), ElementsAre());
+  EXPECT_THAT(ErrorsOfDbr("constraint: NONE"), ElementsAre());
+}
+
+TEST(ConfigCombinations, ACapNeedsTheRepulsionThatItCaps) {
+  EXPECT_THAT(ErrorsOfDbr("max_repulsion: 3"),
+              ElementsAre("algorithm.dbr.max_repulsion: expected repel_negative: true with it, found 3 and "
+                          "repel_negative: false"));
+  EXPECT_THAT(ErrorsOfDbr("max_repulsion: 3 repel_negative: true"), ElementsAre());
+  EXPECT_THAT(ErrorsOfDbr("max_repulsion: 6"), ElementsAre()) << "the default, as a printed config has it";
+}
+
+TEST(ConfigCombinations, SelfImitationFitsItsBehaviourInItsOwnWay) {
+  EXPECT_THAT(ErrorsOfDbr("behavior_data: BATCH advantage: SIL"),
+              ElementsAre(AllOf(StartsWith("algorithm.dbr.behavior_data: expected PARTITIONS"),
+                                HasSubstr("advantage: SIL"), HasSubstr("found BATCH"))));
+  EXPECT_THAT(ErrorsOfDbr("behavior_data: BATCH"), ElementsAre());
+  EXPECT_THAT(ErrorsOfDbr("advantage: SIL"), ElementsAre());
+}
+
+TEST(ConfigCombinations, TheMunchausenTermIsOfOneStep) {
+  EXPECT_THAT(ErrorsOfAlgorithm("n_step: 3 dbr { munchausen_weight: 0.9 }"),
+              ElementsAre(AllOf(StartsWith("algorithm.n_step: expected 1"), HasSubstr("munchausen_weight"),
+                                HasSubstr("found 3"))));
+  EXPECT_THAT(ErrorsOfAlgorithm("n_step: 3 dbr {}"), ElementsAre());
+  EXPECT_THAT(ErrorsOfAlgorithm("dbr { munchausen_weight: 0.9 }"), ElementsAre());
+}
+
+TEST(ConfigCombinations, AllAreReportedAtOnceBesideFieldsOutOfBounds) {
+  EXPECT_THAT(
+      ErrorsOfAlgorithm("discount: 2 critics: 1 n_step: 2 dbr { constraint: NONE first_temperature: 1 "
+                        "entropy_weight: 0.1 min_multiplier: 3 max_multiplier: 2 max_repulsion: 1 "
+                        "behavior_data: BATCH advantage: SIL munchausen_weight: 0.5 }"),
+      testing::UnorderedElementsAre(
+          StartsWith("algorithm.discount"), StartsWith("algorithm.target_critics"),
+          StartsWith("algorithm.n_step"), StartsWith("algorithm.dbr.target_entropy"),
+          StartsWith("algorithm.dbr.entropy_weight"), StartsWith("algorithm.dbr.min_multiplier"),
+          StartsWith("algorithm.dbr.max_repulsion"), StartsWith("algorithm.dbr.behavior_data")));
+}
+
+TEST(ConfigCombinations, AnOverrideIsJudgedWithTheRest) {
+  EXPECT_FALSE(ParseConfig("algorithm { critics: 4 target_critics: 2 }", {"algorithm.critics=1"}).ok());
+  EXPECT_TRUE(ParseConfig("algorithm { critics: 1 }", {"algorithm.target_critics=1"}).ok());
+}
+
+// A printed config sets every field, also those that would contradict others if a user had set them.
+TEST(ConfigCombinations, APrintedConfigReadsBackWithoutAnError) {
+  std::vector<std::string> texts = {"",
+                                    "algorithm { dbr { first_temperature: 1 } }",
+                                    "algorithm { dbr { repel_negative: true max_repulsion: 0 } }",
+                                    "algorithm { dbr { behavior_data: BATCH min_multiplier: 0 } }",
+                                    "algorithm { critics: 1 target_critics: 1 sac {} }",
+                                    "algorithm { n_step: 5 discrete_sac {} }"};
+  for (const auto& entry : std::filesystem::directory_iterator(DBR_SOURCE_DIR "/deploy/configs")) {
+    const auto shipped = LoadConfig(entry.path().string());
+    ASSERT_TRUE(shipped.ok()) << shipped.status();
+    texts.push_back(PrintConfig(*shipped));
+  }
+  EXPECT_GT(texts.size(), 12u);
+  for (const std::string& text : texts) {
+    const auto config = ParseConfig(text);
+    ASSERT_TRUE(config.ok()) << config.status();
+    const std::string printed = PrintConfig(*config);
+    const auto again = ParseConfig(printed);
+    EXPECT_TRUE(again.ok()) << again.status();
+    if (again.ok()) {
+      EXPECT_EQ(PrintConfig(*again), printed);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dbr
