@@ -183,7 +183,7 @@ TYPED_TEST(SoftTarget, HasTheTemperaturesPart) {
   }
 }
 
-TYPED_TEST(SoftTarget, OfOneDrawIsTheExpectedSarsaOfSac) {
+TYPED_TEST(SoftTarget, OfOneDrawIsSacs) {
   this->config()->set_target_samples(1);
   const double found = this->UpdateOn(7);
   EXPECT_NEAR(found, this->expected_, 1e-10);
