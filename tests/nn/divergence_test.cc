@@ -4,10 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 
 #include "core/rng.h"
-#include "nn/gaussian_head.h"
 #include "nn/tanh_gaussian.h"
 #include "tests/nn/gaussian_cases.h"
 
@@ -122,6 +120,60 @@ TEST(ExactMmdTest, PointMassesFollowTheKernelItself) {
   EXPECT_NEAR(ExactMmdSum(p, q, 3.0), std::sqrt(2 - 2 * std::exp(-4 / 6.0) + kMmdFloor), 1e-9);
 }
 
+double SquaredMmdSum(const Gaussian& p, const Gaussian& q, double sigma,
+                     GaussianGradient<double>* d_p = nullptr) {
+  Vector squared;
+  SquaredMmd<double>(p.view(), q.view(), sigma, &squared, d_p);
+  return squared.sum();
+}
+
+TEST(SquaredMmdTest, IsTheSquareOfTheMmdWithoutItsFloor) {
+  Rng rng(9);
+  const Gaussian p = RandomGaussian(3, 4, rng), q = RandomGaussian(3, 4, rng);
+  Vector squared, mmd;
+  SquaredMmd<double>(p.view(), q.view(), 0.7, &squared, nullptr);
+  ExactMmd<double>(p.view(), q.view(), 0.7, &mmd, nullptr);
+  ExpectNear(squared, (mmd.array().square() - kMmdFloor).matrix(), 1e-12);
+  EXPECT_GT(squared.minCoeff(), 1e-3);
+  EXPECT_EQ(SquaredMmdSum(p, p, 0.7), 0) << "rounding leads to nothing below 0";
+}
+
+TEST(SquaredMmdTest, GradientMatchesCentralDifferences) {
+  Rng rng(10);
+  for (const double sigma : {0.3, 1.0, 20.0}) {
+    const Gaussian p = RandomGaussian(4, 3, rng), q = RandomGaussian(4, 3, rng);
+    GaussianGradient<double> d_p;
+    SquaredMmdSum(p, q, sigma, &d_p);
+    ExpectIsGradient(
+        d_p.mean,
+        [&](const Matrix& at) {
+          return SquaredMmdSum({at, p.log_std}, q, sigma);
+        },
+        p.mean);
+    ExpectIsGradient(
+        d_p.log_std,
+        [&](const Matrix& at) {
+          return SquaredMmdSum({p.mean, at}, q, sigma);
+        },
+        p.log_std);
+  }
+}
+
+// Ten times nearer means a tenth of the gradient. That of the root keeps its length outside the floor.
+TEST(SquaredMmdTest, TheGradientGoesTo0WithTheDistanceWhereThatOfTheRootDoesNot) {
+  Rng rng(11);
+  const Gaussian q = RandomGaussian(3, 1, rng);
+  const Matrix direction = Normals(3, 1, rng);
+  const auto length = [&](auto* sum, double distance) {
+    GaussianGradient<double> d_p;
+    sum({q.mean + distance * direction, q.log_std}, q, 1, &d_p);
+    return d_p.mean.norm();
+  };
+  EXPECT_NEAR(length(SquaredMmdSum, 1e-4) / length(SquaredMmdSum, 1e-3), 0.1, 1e-3);
+  EXPECT_EQ(length(SquaredMmdSum, 0), 0);
+  EXPECT_NEAR(length(ExactMmdSum, 0.05) / length(ExactMmdSum, 0.1), 1, 0.05);
+}
+
 Matrix RandomProbabilities(Eigen::Index rows, Eigen::Index cols, Rng& rng) {
   const Matrix weights = Normals(rows, cols, rng).array().exp();
   return weights.array().rowwise() / weights.colwise().sum().array();
@@ -156,6 +208,35 @@ TEST(CategoricalMmdTest, GradientsMatchCentralDifferences) {
       d_p, [&](const Matrix& at) { return CategoricalMmdSum(at, q, 1.5); }, p);
   ExpectIsGradient(
       -d_p, [&](const Matrix& at) { return CategoricalMmdSum(p, at, 1.5); }, q);
+}
+
+double SquaredCategoricalMmdSum(const Matrix& p, const Matrix& q, double sigma, Matrix* d_p = nullptr) {
+  Vector squared;
+  SquaredCategoricalMmd<double>(p, q, sigma, &squared, d_p);
+  return squared.sum();
+}
+
+TEST(SquaredCategoricalMmdTest, IsTheSquareOfTheMmdWithoutItsFloor) {
+  Rng rng(12);
+  const Matrix p = RandomProbabilities(5, 4, rng), q = RandomProbabilities(5, 4, rng);
+  Vector squared, mmd;
+  SquaredCategoricalMmd<double>(p, q, 0.8, &squared, nullptr);
+  CategoricalMmd<double>(p, q, 0.8, &mmd, nullptr);
+  ExpectNear(squared, (mmd.array().square() - kMmdFloor).matrix(), 1e-12);
+  EXPECT_GT(squared.minCoeff(), 1e-3);
+}
+
+TEST(SquaredCategoricalMmdTest, GradientMatchesCentralDifferencesAndGoesTo0BetweenEquals) {
+  Rng rng(13);
+  const Matrix p = RandomProbabilities(7, 4, rng), q = RandomProbabilities(7, 4, rng);
+  Matrix d_p, near;
+  SquaredCategoricalMmdSum(p, q, 1.5, &d_p);
+  ExpectIsGradient(
+      d_p, [&](const Matrix& at) { return SquaredCategoricalMmdSum(at, q, 1.5); }, p);
+  SquaredCategoricalMmdSum(q + 0.01 * (p - q), q, 1.5, &near);
+  ExpectNear(near, 0.01 * d_p, 1e-12);
+  SquaredCategoricalMmdSum(q, q, 1.5, &near);
+  EXPECT_TRUE(near.isZero(0));
 }
 
 TEST(GaussianKlTest, MatchesReferenceValuesAndGradients) {
@@ -252,60 +333,6 @@ TEST(SampledKlTest, TheMeanOfManyDrawsIsTheExactKl) {
   SampledKl<double>(p.view(), q.view(), Normals(2, kDraws, rng), &kl, nullptr);
   const double exact = KlSum(p, q);
   EXPECT_NEAR(kl[0], exact, 0.03 * (1 + exact));
-}
-
-TEST(SquaredMmdTest, IsTheSquareOfTheExactMmd) {
-  Rng rng(12);
-  const Gaussian p = RandomGaussian(3, 4, rng), q = RandomGaussian(3, 4, rng);
-  Vector root, squared;
-  GaussianGradient<double> of_root, of_square;
-  ExactMmd<double>(p.view(), q.view(), 0.7, &root, &of_root);
-  SquaredMmd<double>(p.view(), q.view(), 0.7, &squared, &of_square);
-  ExpectNear(squared, (root.array().square() - kMmdFloor).matrix());
-  for (int j = 0; j < 4; ++j) {
-    ExpectNear(of_square.mean.col(j), 2 * root[j] * of_root.mean.col(j));
-    ExpectNear(of_square.log_std.col(j), 2 * root[j] * of_root.log_std.col(j));
-  }
-}
-
-// The root's gradient keeps its length down to a small distance; the square's does not.
-TEST(SquaredMmdTest, ItsGradientVanishesWhereThePoliciesAreEqual) {
-  Rng rng(13);
-  const Gaussian p = RandomGaussian(2, 3, rng);
-  Vector squared;
-  GaussianGradient<double> gradient;
-  SquaredMmd<double>(p.view(), p.view(), 1, &squared, &gradient);
-  EXPECT_TRUE(squared.isZero(1e-12));
-  EXPECT_TRUE(gradient.mean.isZero(1e-12));
-  EXPECT_TRUE(gradient.log_std.isZero(1e-12));
-}
-
-TEST(SquaredCategoricalMmdTest, IsTheSquareOfTheCategoricalMmd) {
-  const Matrix p = (Matrix(3, 2) << 0.2, 0.5, 0.3, 0.5, 0.5, 0).finished(),
-               q = (Matrix(3, 2) << 0.6, 0.5, 0.1, 0.25, 0.3, 0.25).finished();
-  Vector root, squared;
-  Matrix of_root, of_square;
-  CategoricalMmd<double>(p, q, 0.7, &root, &of_root);
-  SquaredCategoricalMmd<double>(p, q, 0.7, &squared, &of_square);
-  ExpectNear(squared, (root.array().square() - kMmdFloor).matrix());
-  for (int j = 0; j < 2; ++j) ExpectNear(of_square.col(j), 2 * root[j] * of_root.col(j));
-}
-
-TEST(GaussianHeadTest, AClippedLogStdPassesTheGradientThatLeadsBack) {
-  const LogStdLimits limits{-5, 2};
-  const Matrix output = (Matrix(2, 6) << 0, 0, 0, 0, 0, 0, 3, 3, -6, -6, 1, 3).finished();
-  GaussianHead<double> head;
-  head.Split(output, limits);
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const GaussianGradient<double> gradient{Matrix::Ones(1, 6),
-                                          (Matrix(1, 6) << 1, -1, 1, -1, -1, nan).finished()};
-  Matrix d_output;
-  head.Join(gradient, &d_output);
-  EXPECT_EQ(d_output.row(0), gradient.mean);
-  // A step goes against the gradient: from above the limits it leads back where the gradient is above 0.
-  const Matrix expected = (Matrix(1, 5) << 1, 0, 0, -1, -1).finished();
-  EXPECT_EQ(d_output.block(1, 0, 1, 5), expected);
-  EXPECT_TRUE(std::isnan(d_output(1, 5)));
 }
 
 }  // namespace

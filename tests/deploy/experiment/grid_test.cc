@@ -259,6 +259,18 @@ TEST_F(GridTest, RefusesAnAlgorithmThatDoesNotServeATasksActions) {
                         HasSubstr("discrete actions of environment 'connect4'"), HasSubstr("found sac"))));
 }
 
+TEST_F(GridTest, RefusesFieldsThatContradictEachOtherInACell) {
+  EXPECT_THAT(ErrorsOf({{"epsilon: 0.1 constraint: FIXED", "epsilon: 0.1 max_repulsion: 3"},
+                        {"batch_size: 5 dbr", "batch_size: 5 critics: 1 dbr"}}),
+              testing::UnorderedElementsAre(
+                  HasSubstr("task 'connect4', contender 'dbr': algorithm.dbr.max_repulsion: expected "
+                            "repel_negative: true"),
+                  HasSubstr("task 'connect4', contender 'dbr': algorithm.target_critics: expected at most "
+                            "algorithm.critics (1)"),
+                  HasSubstr("task 'hopper', contender 'dbr': algorithm.dbr.max_repulsion")))
+      << "on hopper-medium the contender has no dbr";
+}
+
 TEST_F(GridTest, RefusesExplorationAndOpponentsThatDoNotFitTheTask) {
   EXPECT_THAT(
       ErrorsOf({{"env { name: \"connect4\" }", "env { name: \"connect4\" } actor { action_noise: 0.1 }"}}),

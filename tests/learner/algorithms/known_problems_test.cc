@@ -1,9 +1,10 @@
-// Tests every algorithm of the registry on small problems with answers in closed form.
+// Tests every algorithm of the registry, and some variants, on small problems with answers in closed form.
 #include "tests/learner/algorithms/known_problems.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "learner/algorithms/registry.h"
@@ -54,10 +55,58 @@ KnownProblem WithConstantRewards(KnownProblem problem) {
   return problem;
 }
 
-class KnownProblems : public testing::TestWithParam<AlgorithmId> {
+// An algorithm with its defaults, or with one of its variants.
+struct Solver {
+  AlgorithmId id;
+  std::string variant;  // a name in kVariants; empty: the defaults
+};
+
+struct Variant {
+  const char* name;
+  const char* algorithm;
+  void (*set)(AlgorithmConfig* config);
+};
+
+constexpr Variant kVariants[] = {
+    {"Online", "dbr",
+     [](AlgorithmConfig* config) {
+       DbrConfig* dbr = config->mutable_dbr();
+       dbr->set_first_temperature(0.02);
+       dbr->set_repel_negative(true);
+       dbr->set_max_repulsion(6);
+     }},
+    {"FourCritics", "dbr", [](AlgorithmConfig* config) { config->set_critics(4); }},
+    {"FourCritics", "sac", [](AlgorithmConfig* config) { config->set_critics(4); }},
+    {"Batch", "dbr",
+     [](AlgorithmConfig* config) { config->mutable_dbr()->set_behavior_data(DbrConfig::BATCH); }},
+};
+
+std::vector<Solver> SolversAmong(const std::vector<AlgorithmId>& ids) {
+  std::vector<Solver> solvers;
+  for (const AlgorithmId& id : ids) {
+    solvers.push_back({id, ""});
+    for (const Variant& variant : kVariants) {
+      if (id.name == variant.algorithm) solvers.push_back({id, variant.name});
+    }
+  }
+  return solvers;
+}
+
+std::string NameOf(const testing::TestParamInfo<Solver>& info) {
+  const AlgorithmId& id = info.param.id;
+  return id.name + (id.actions == ActionKind::kDiscrete ? "Discrete" : "Continuous") + info.param.variant;
+}
+
+class KnownProblems : public testing::TestWithParam<Solver> {
  protected:
-  static bool discrete() { return GetParam().actions == ActionKind::kDiscrete; }
-  static AlgorithmConfig Config() { return ProblemSolvingConfig(GetParam()); }
+  static bool discrete() { return GetParam().id.actions == ActionKind::kDiscrete; }
+  static AlgorithmConfig Config() {
+    AlgorithmConfig config = ProblemSolvingConfig(GetParam().id);
+    for (const Variant& variant : kVariants) {
+      if (GetParam().variant == variant.name && GetParam().id.name == variant.algorithm) variant.set(&config);
+    }
+    return config;
+  }
 };
 
 constexpr int kUpdates = 500;
@@ -132,11 +181,9 @@ TEST_P(MaskedProblems, AnIllegalActionIsNeitherTakenNorCounted) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Registry, MaskedProblems, testing::ValuesIn(AlgorithmsOver(ActionKind::kDiscrete)),
-                         [](const auto& info) { return info.param.name; });
-INSTANTIATE_TEST_SUITE_P(Registry, KnownProblems, testing::ValuesIn(Algorithms()), [](const auto& info) {
-  return info.param.name + (info.param.actions == ActionKind::kDiscrete ? "Discrete" : "Continuous");
-});
+INSTANTIATE_TEST_SUITE_P(Registry, MaskedProblems,
+                         testing::ValuesIn(SolversAmong(AlgorithmsOver(ActionKind::kDiscrete))), NameOf);
+INSTANTIATE_TEST_SUITE_P(Registry, KnownProblems, testing::ValuesIn(SolversAmong(Algorithms())), NameOf);
 
 // One state and episodes of one step, so that the data of DBR's two behaviour policies is known.
 class Bandit : public testing::TestWithParam<DbrConfig::Constraint> {

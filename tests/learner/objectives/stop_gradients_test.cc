@@ -132,9 +132,28 @@ TEST_P(StopGradients, ThePolicysLossMovesThePolicyAlone) {
               UnorderedElementsAre("policy"));
 }
 
-TEST_P(StopGradients, AWarmStartHoldsTheMultiplierToo) {
+// In the warm start the multiplier stands still.
+TEST_P(StopGradients, TheWarmStartMovesThePolicyAloneAndHoldsTheMultiplier) {
   EXPECT_THAT(MovedByConfig([](DbrConfig* config) { config->set_warm_start_updates(10); }),
               UnorderedElementsAre("policy", "log_alpha"));
+  dbr().set_warm_start_updates(10);
+  EXPECT_THAT(MovedByPlus(), UnorderedElementsAre("beta_plus", "policy"));
+}
+
+TEST_P(StopGradients, TheTemperatureIsInThePolicysLossAndInTheTarget) {
+  dbr().set_first_temperature(0.5);
+  EXPECT_THAT(MovedByConfig([](DbrConfig* config) { config->set_first_temperature(2); }),
+              UnorderedElementsAre("policy", "critics", "log_temperature"));
+  EXPECT_THAT(MovedByPlus(), UnorderedElementsAre("beta_plus", "policy", "log_alpha"));
+}
+
+TEST_P(StopGradients, TheTargetEntropyMovesTheTemperatureAlone) {
+  dbr().set_first_temperature(0.5);
+  EXPECT_THAT(MovedByConfig([](DbrConfig* config) {
+                config->set_target_entropy(5);
+                config->set_target_entropy_ratio(0.1);
+              }),
+              UnorderedElementsAre("log_temperature"));
 }
 
 TEST_P(StopGradients, TheMultiplierWeighsThePolicysConstraintAndNothingElse) {
