@@ -62,6 +62,14 @@ void FindContradictions(const Config& config, std::vector<std::string>* errors) 
     errors->push_back(absl::StrCat("algorithm.target_critics: expected at most algorithm.critics (",
                                    algorithm.critics(), "), found ", algorithm.target_critics()));
   }
+  const AlgorithmConfig& defaults = AlgorithmConfig::default_instance();
+  if (algorithm.has_ddqn() && (algorithm.critics() != defaults.critics() ||
+                               algorithm.target_critics() != defaults.target_critics())) {
+    errors->push_back(absl::StrCat("algorithm.critics: expected ", defaults.critics(), " of which ",
+                                   defaults.target_critics(),
+                                   " are asked with ddqn, whose one network is its ", "critic, found ",
+                                   algorithm.critics(), " of which ", algorithm.target_critics()));
+  }
   if (algorithm.has_dbr()) CheckDbr(config, errors);
 }
 

@@ -46,6 +46,15 @@ TEST(ConfigCombinations, NoMoreCriticsAreAskedThanThereAre) {
   EXPECT_THAT(ErrorsOfAlgorithm("critics: 4"), ElementsAre());
 }
 
+TEST(ConfigCombinations, DoubleDqnHasNoEnsemble) {
+  EXPECT_THAT(
+      ErrorsOfAlgorithm("ddqn {} critics: 4"),
+      ElementsAre("algorithm.critics: expected 2 of which 2 are asked with ddqn, whose one network is its "
+                  "critic, found 4 of which 2"));
+  EXPECT_THAT(ErrorsOfAlgorithm("ddqn {} target_critics: 1"), ElementsAre(HasSubstr("found 2 of which 1")));
+  EXPECT_THAT(ErrorsOfAlgorithm("ddqn {}"), ElementsAre());
+}
+
 TEST(ConfigCombinations, TheMultiplierBeginsBetweenItsLimits) {
   EXPECT_THAT(ErrorsOfDbr("first_multiplier: 3 max_multiplier: 2"),
               ElementsAre(AllOf(StartsWith("algorithm.dbr.first_multiplier: expected min_multiplier ("),
