@@ -248,7 +248,6 @@ absl::StatusOr<EnvSpec> EnvSpecOf(const Config& config) {
 absl::Status CheckFits(const Config& config, const EnvSpec& env) {
   RETURN_IF_ERROR(CheckServes(config.algorithm(), env.name, env.actions));
   RETURN_IF_ERROR(CheckMirror(config.algorithm(), env));
-  RETURN_IF_ERROR(CheckCriticLayerNorm(config.algorithm(), config.network().critic_layer_norm()));
   RETURN_IF_ERROR(CheckExploration(env, config.actor()));
   const EvaluationConfig& evaluation = config.evaluation();
   RETURN_IF_ERROR(CheckMode(config, env, "actor.mode", config.actor().mode()));

@@ -63,11 +63,13 @@ void ContinuousDbr<Scalar>::ComputeNextValue(const BasicBatch<Scalar>& batch) {
 
 template <class Scalar>
 void ContinuousDbr<Scalar>::EvaluateBehaviors(const BasicBatch<Scalar>& batch) {
-  networks_.runner.Run([&] { beta_plus_.At(batch.observations, &networks_.beta_plus); },
-                       [&] {
-                         if (!IsMovedByMinus(config().constraint())) return;
-                         beta_minus_.At(batch.observations, &networks_.beta_minus);
-                       });
+  networks_.runner.Run(
+      [&] {
+        if (networks_.needs_plus()) beta_plus_.At(batch.observations, &networks_.beta_plus);
+      },
+      [&] {
+        if (networks_.needs_minus()) beta_minus_.At(batch.observations, &networks_.beta_minus);
+      });
 }
 
 template <class Scalar>
@@ -125,8 +127,11 @@ template <class Scalar>
 double ContinuousDbr<Scalar>::UpdateFlops() const {
   const Eigen::Index n = this->needs().uniform;
   const CriticEnsemble<Scalar>& critics = networks_.critics;
+  const Eigen::Index draws = n * config().policy_samples();
   return critics.TargetFlops(n * config().target_samples()) + critics.FitFlops(n) +
-         critics.InputGradientFlops(n * config().policy_samples()) + networks_.PolicyFlops();
+         critics.TargetFlops(draws) +
+         critics.FirstInputGradientFlops(draws) / config().updates_per_policy_update() +
+         networks_.PolicyFlops();
 }
 
 template class ContinuousDbr<float>;

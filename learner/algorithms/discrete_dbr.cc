@@ -63,11 +63,13 @@ void DiscreteDbr<Scalar>::ComputeTargets(const BasicBatch<Scalar>& batch) {
 
 template <class Scalar>
 void DiscreteDbr<Scalar>::EvaluateBehaviors(const BasicBatch<Scalar>& batch) {
-  networks_.runner.Run([&] { beta_plus_.At(batch.observations, batch.masks, &networks_.beta_plus); },
-                       [&] {
-                         if (!IsMovedByMinus(config().constraint())) return;
-                         beta_minus_.At(batch.observations, batch.masks, &networks_.beta_minus);
-                       });
+  networks_.runner.Run(
+      [&] {
+        if (networks_.needs_plus()) beta_plus_.At(batch.observations, batch.masks, &networks_.beta_plus);
+      },
+      [&] {
+        if (networks_.needs_minus()) beta_minus_.At(batch.observations, batch.masks, &networks_.beta_minus);
+      });
 }
 
 template <class Scalar>

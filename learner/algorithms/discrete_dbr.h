@@ -23,9 +23,8 @@ namespace dbr {
 //      divides Q by its mean size. Each critic regresses on y.
 //   3. pi minimises -(E[min_i E_pi Q_i] + tau H(pi)) + alpha * (D(pi, beta+) - c), the dynamic constraint of
 //      the paper's section "From ARM and BEAR to DBR".
-//   4. alpha ascends on alpha * (D(pi, beta+) - c). The temperature tau rises while the entropy H(pi) is
-//   below
-//      target_entropy_ratio of the greatest one and falls while it is above, as in discrete SAC. Without
+//   4. alpha ascends on alpha * (D(pi, beta+) - c). The temperature tau rises while the entropy H(pi) is less
+//      than target_entropy_ratio of the greatest one and falls while it is more, as in discrete SAC. Without
 //      first_temperature tau is 0 in step 2 and entropy_weight in step 3.
 //   5. Polyak averaging of the critics and of pi.
 //   6. A = Q(s, a) - V(s) for every transition of B. Q is the smaller twin, and V is its expectation under
@@ -39,7 +38,7 @@ namespace dbr {
 // before it is scaled (the paper's section on ablations). beta+ is the one that step 1 left.
 // Constraint NONE: step 3 has no second term, and step 4 moves tau alone.
 // behavior_data BATCH: in place of step 1, beta+ and beta- are fitted after step 6 to the transitions of B
-// with A >= 0 and with A <= 0.
+// in D+ and in D- (BatchPartition).
 // updates_per_policy_update k: steps 3 and 4 are made in every k-th update.
 //
 // Departures from the paper: steps 3 and 6 use the critics' values from before step 2's gradient step, and

@@ -47,6 +47,9 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
   Scalar tau() const { return soft ? temperature.value() : Scalar{0}; }
   // Whether the policy's loss of this update has its Q term: false during the warm start.
   bool uses_q() const { return this->updates >= config().warm_start_updates(); }
+  // Whether this update needs beta+ and beta- at the states of B.
+  bool needs_plus() const { return improves_policy() || config().munchausen_weight() > 0; }
+  bool needs_minus() const { return improves_policy() && IsMovedByMinus(config().constraint()); }
   // Whether this update improves the policy, the multiplier and the temperature.
   bool improves_policy() const { return (this->updates + 1) % config().updates_per_policy_update() == 0; }
 
@@ -96,10 +99,14 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
     for (const int behavior : {batch.plus, batch.minus}) {
       if (behavior == 0) flops += shape.ParameterGradientFlops(batch.uniform);
     }
-    // At s: pi, beta+ and beta-, whether the constraint looks at beta- or not, so that what is left out shows
-    // as time. At s': the target pi', and beta+ too where the value is penalised.
-    const int forward = config().value_penalty() && constrained ? 5 : 4;
-    return flops + forward * shape.ForwardFlops(batch.uniform) + shape.ParameterGradientFlops(batch.uniform);
+    // At s in each update: pi; where it improves pi: beta+ and beta-, whether the constraint looks at beta-
+    // or not, so that what is left out shows as time. At s': the target pi', and beta+ too where the value is
+    // penalised.
+    const int each = config().value_penalty() && constrained ? 3 : 2;
+    const double improving =
+        2 * shape.ForwardFlops(batch.uniform) + shape.ParameterGradientFlops(batch.uniform);
+    return flops + each * shape.ForwardFlops(batch.uniform) +
+           improving / config().updates_per_policy_update();
   }
 
   static std::vector<UpdateMetric> Metrics() {

@@ -94,20 +94,12 @@ absl::Status CheckServes(const AlgorithmConfig& config, const std::string& env, 
                                                  name.empty() ? "none" : name));
 }
 
-absl::Status CheckCriticLayerNorm(const AlgorithmConfig& config, bool critic_layer_norm) {
-  if (!critic_layer_norm || config.algorithm_case() != AlgorithmConfig::kDdqn) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      "config field 'network.critic_layer_norm': expected false with the algorithm ddqn, whose one network "
-      "is its policy too, found true. Leave it out, or choose an algorithm with critics.");
-}
-
 absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& spec) {
   RETURN_IF_ERROR(CheckServes(spec.config, spec.env, spec.actions));
   RETURN_IF_ERROR(CheckMirror(spec.config, {.name = spec.env,
                                             .observation_size = spec.observation_size,
                                             .actions = spec.actions,
                                             .symmetry = spec.symmetry}));
-  RETURN_IF_ERROR(CheckCriticLayerNorm(spec.config, spec.critic_layer_norm));
   const Entry* entry =
       std::find_if(std::begin(kAlgorithms), std::end(kAlgorithms), [&spec](const Entry& one) {
         return one.actions == spec.actions.kind && one.config_case == spec.config.algorithm_case();

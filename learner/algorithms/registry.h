@@ -13,18 +13,14 @@
 
 namespace dbr {
 
-// Makes the algorithm that spec.config names. Returns the errors of CheckServes, CheckCriticLayerNorm and
-// CheckMirror (learner/algorithms/mirrored.h).
+// Makes the algorithm that spec.config names. Returns the errors of CheckServes and CheckMirror
+// (learner/algorithms/mirrored.h).
 absl::StatusOr<std::unique_ptr<Algorithm>> MakeAlgorithm(const AlgorithmSpec& spec);
 
 // Checks that the algorithm that `config` sets serves the environment's actions. Returns InvalidArgument
 // otherwise, with the names of those that do. Where only a chosen variant does not serve them, the error
 // names its field.
 absl::Status CheckServes(const AlgorithmConfig& config, const std::string& env, const ActionSpace& actions);
-
-// Checks that the algorithm that `config` sets has critics apart from its policy, where they are to be
-// normalised. Returns InvalidArgument otherwise.
-absl::Status CheckCriticLayerNorm(const AlgorithmConfig& config, bool critic_layer_norm);
 
 // All algorithms, once for each kind of action that they serve. The conformance suite tests each of them.
 struct AlgorithmId {

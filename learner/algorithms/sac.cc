@@ -60,7 +60,10 @@ void Sac<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch, bool improves) 
 template <class Scalar>
 double Sac<Scalar>::UpdateFlops() const {
   const Eigen::Index n = this->needs().uniform;
-  return networks_.UpdateFlops(n) + networks_.critics.InputGradientFlops(n);
+  const CriticEnsemble<Scalar>& critics = networks_.critics;
+  const double improving = 1.0 / networks_.spec.config.sac().updates_per_policy_update();
+  return networks_.UpdateFlops(n, improving) + critics.TargetFlops(n) +
+         improving * critics.FirstInputGradientFlops(n);
 }
 
 template class Sac<float>;

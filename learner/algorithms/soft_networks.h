@@ -29,11 +29,11 @@ struct SoftNetworks : ActorCritic<Scalar> {
   }
 
   // The useful floating-point operations, for n samples, that both kinds of action need: the critics' targets
-  // and fits, the policy at s and s', and its gradient.
-  double UpdateFlops(Eigen::Index n) const {
+  // and fits, the policy at s and s', and its gradient in a share `improving` of the updates.
+  double UpdateFlops(Eigen::Index n, double improving = 1) const {
     const MlpShape& shape = this->policy.shape();
     return this->critics.TargetFlops(n) + this->critics.FitFlops(n) + 2 * shape.ForwardFlops(n) +
-           shape.ParameterGradientFlops(n);
+           improving * shape.ParameterGradientFlops(n);
   }
 
   static std::vector<UpdateMetric> Metrics() {

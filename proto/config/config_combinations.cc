@@ -54,6 +54,22 @@ void CheckDbr(const Config& config, std::vector<std::string>* errors) {
   }
 }
 
+// Double DQN has one network, which is its policy and its critic.
+void CheckDdqn(const Config& config, std::vector<std::string>* errors) {
+  const AlgorithmConfig &algorithm = config.algorithm(), &defaults = AlgorithmConfig::default_instance();
+  if (algorithm.critics() != defaults.critics() || algorithm.target_critics() != defaults.target_critics()) {
+    errors->push_back(absl::StrCat("algorithm.critics: expected ", defaults.critics(), " of which ",
+                                   defaults.target_critics(),
+                                   " are asked with ddqn, whose one network is its ", "critic, found ",
+                                   algorithm.critics(), " of which ", algorithm.target_critics()));
+  }
+  if (config.network().critic_layer_norm()) {
+    errors->emplace_back(
+        "network.critic_layer_norm: expected false with ddqn, whose one network is its policy too, found "
+        "true");
+  }
+}
+
 }  // namespace
 
 void FindContradictions(const Config& config, std::vector<std::string>* errors) {
@@ -62,14 +78,7 @@ void FindContradictions(const Config& config, std::vector<std::string>* errors) 
     errors->push_back(absl::StrCat("algorithm.target_critics: expected at most algorithm.critics (",
                                    algorithm.critics(), "), found ", algorithm.target_critics()));
   }
-  const AlgorithmConfig& defaults = AlgorithmConfig::default_instance();
-  if (algorithm.has_ddqn() && (algorithm.critics() != defaults.critics() ||
-                               algorithm.target_critics() != defaults.target_critics())) {
-    errors->push_back(absl::StrCat("algorithm.critics: expected ", defaults.critics(), " of which ",
-                                   defaults.target_critics(),
-                                   " are asked with ddqn, whose one network is its ", "critic, found ",
-                                   algorithm.critics(), " of which ", algorithm.target_critics()));
-  }
+  if (algorithm.has_ddqn()) CheckDdqn(config, errors);
   if (algorithm.has_dbr()) CheckDbr(config, errors);
 }
 

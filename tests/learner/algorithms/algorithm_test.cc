@@ -345,16 +345,6 @@ INSTANTIATE_TEST_SUITE_P(Registry, Conformance, testing::ValuesIn(Members()), []
          (info.param.bfloat16 ? "Bfloat16" : "");
 });
 
-TEST(CriticLayerNormTest, IsRefusedWhereThePolicyIsTheCritic) {
-  AlgorithmSpec spec = SmallSpec();
-  spec.config.mutable_ddqn();
-  EXPECT_TRUE(MakeAlgorithm(spec).ok());
-  spec.critic_layer_norm = true;
-  const absl::Status status = MakeAlgorithm(spec).status();
-  EXPECT_TRUE(absl::IsInvalidArgument(status)) << status;
-  EXPECT_THAT(std::string(status.message()), testing::HasSubstr("network.critic_layer_norm"));
-}
-
 TEST(LearningRateTest, FallsLinearlyToItsEndAndStaysThere) {
   AlgorithmConfig config;
   config.set_learning_rate(0.1);

@@ -53,6 +53,9 @@ TEST(ConfigCombinations, DoubleDqnHasNoEnsemble) {
                   "critic, found 4 of which 2"));
   EXPECT_THAT(ErrorsOfAlgorithm("ddqn {} target_critics: 1"), ElementsAre(HasSubstr("found 2 of which 1")));
   EXPECT_THAT(ErrorsOfAlgorithm("ddqn {}"), ElementsAre());
+  const auto normalised = ParseConfig("network { critic_layer_norm: true } algorithm { ddqn {} }");
+  EXPECT_THAT(std::string(normalised.status().message()),
+              HasSubstr("network.critic_layer_norm: expected false with ddqn"));
 }
 
 TEST(ConfigCombinations, TheMultiplierBeginsBetweenItsLimits) {
