@@ -68,9 +68,9 @@ def bullet_env(name):
     gym.envs.registration.registry = Registry()
     gym.envs.registration.register = lambda *_, **__: None
     gym.envs.registration.make = gym.envs.registration.spec = None
-    sys.modules.setdefault("gym.spaces", gymnasium.spaces)
+    sys.modules["gym.spaces"] = gymnasium.spaces
     for module in (gym, gym.utils, gym.utils.seeding, gym.envs, gym.envs.registration):
-        sys.modules.setdefault(module.__name__, module)
+        sys.modules[module.__name__] = module
     from pybullet_envs import gym_locomotion_envs
 
     robot = getattr(gym_locomotion_envs, name)()
