@@ -69,17 +69,18 @@ AlgorithmSpec With(AlgorithmSpec spec, const Set& set) {
 void Dbr(AlgorithmConfig& config) {
   config.mutable_dbr()->set_divergence(DbrConfig::MMD_EXACT);
 }
-// DBR as deploy/configs has it for the robots.
+// DBR as deploy/configs has it for the robots online.
 void DbrOfTheConfigs(AlgorithmConfig& config) {
   DbrConfig& dbr = *config.mutable_dbr();
-  dbr.set_constraint(DbrConfig::DYNAMIC_MIN);
-  dbr.set_divergence(DbrConfig::MMD_EXACT);
+  dbr.set_constraint(DbrConfig::DYNAMIC_MAX);
+  dbr.set_divergence(DbrConfig::KL);
   dbr.set_epsilon(0.1);
-  dbr.set_normalize_q(true);
+  dbr.set_repel_negative(true);
+  dbr.set_first_temperature(1);
   dbr.set_behavior_batch_size(128);
   dbr.set_target_min_weight(1);
   dbr.set_target_samples(1);
-  dbr.set_policy_samples(2);
+  dbr.set_policy_samples(1);
 }
 // DBR over discrete actions with KL, the default.
 void DiscreteDbr(AlgorithmConfig& config) {
