@@ -28,11 +28,6 @@ Rng ActorRng(const ActorOptions& options) {
   return Rng(options.config.seed()).Fork(kActorStream + options.index);
 }
 
-EnvOptions TrainingEnv(const Config& config) {
-  return {.name = config.env().name(),
-          .opponents = {config.env().opponents().begin(), config.env().opponents().end()}};
-}
-
 SubscriberOptions Subscription(const ActorOptions& options, const EnvSpec& env, std::string name,
                                std::uint64_t seed) {
   return {.address = options.learner_address,
@@ -87,7 +82,7 @@ class BrokenWorlds {
 absl::StatusOr<std::unique_ptr<Actor>> Actor::Create(const ActorOptions& options) {
   ASSIGN_OR_RETURN(
       std::unique_ptr<VectorEnv> envs,
-      VectorEnv::Create(TrainingEnv(options.config), static_cast<int>(options.config.actor().envs())));
+      VectorEnv::Create(TrainingEnv(options.config.env()), static_cast<int>(options.config.actor().envs())));
   RETURN_IF_ERROR(CheckExploration(envs->spec(), options.config.actor()));
   return std::unique_ptr<Actor>(new Actor(options, std::move(envs)));
 }

@@ -238,10 +238,7 @@ int DefaultActors(int cores) {
 }
 
 absl::StatusOr<EnvSpec> EnvSpecOf(const Config& config) {
-  ASSIGN_OR_RETURN(
-      const std::unique_ptr<Env> env,
-      MakeEnv({.name = config.env().name(),
-               .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
+  ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv(TrainingEnv(config.env())));
   return env->spec();
 }
 

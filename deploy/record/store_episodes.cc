@@ -102,9 +102,7 @@ absl::StatusOr<RunStore> OpenRunStore(const std::string& run) {
         folder.config(), ", whose store has the sums of several rewards. Name another run, or play its ",
         "policy anew: --quality medium --policy ", run));
   }
-  EnvOptions env_options{.name = config.env().name(), .opponents = {}};
-  env_options.opponents.assign(config.env().opponents().begin(), config.env().opponents().end());
-  ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv(env_options));
+  ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv(TrainingEnv(config.env())));
   RunStore opened{.env = env->spec(), .store = nullptr};
   ASSIGN_OR_RETURN(
       opened.store,

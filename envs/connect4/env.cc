@@ -1,11 +1,13 @@
 #include "envs/connect4/env.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
 #include "core/check.h"
 #include "core/status_macros.h"
+#include "envs/connect4/playout.h"
 
 namespace dbr::connect4 {
 namespace {
@@ -26,30 +28,47 @@ StepResult LastStep(int outcome) {
   return result;
 }
 
+// Returns a position of a game of random moves, before its last move, with each number of moves as likely as
+// any other. The empty board is one of them.
+Board RandomStart(Rng& rng) {
+  std::array<Board, kCells> positions;
+  std::uint32_t count = 0;
+  ChoiceStream choices(rng);
+  for (Board board; !board.IsOver(); board.PlayCell(choices.SetBit(board.landing_cells())))
+    positions[count++] = board;
+  return positions[rng.Below(count)];
+}
+
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<Env>> Connect4Env::Make(const std::vector<std::string>& names) {
+absl::StatusOr<std::unique_ptr<Env>> Connect4Env::Make(const std::vector<std::string>& names,
+                                                       double random_start_share) {
   std::vector<std::unique_ptr<Opponent>> opponents;
   for (const std::string& name : names.empty() ? std::vector<std::string>{"random"} : names) {
     ASSIGN_OR_RETURN(opponents.emplace_back(), MakeOpponent(name));
   }
-  return std::unique_ptr<Env>(new Connect4Env(std::move(opponents)));
+  return std::unique_ptr<Env>(new Connect4Env(std::move(opponents), random_start_share));
 }
 
-Connect4Env::Connect4Env(std::vector<std::unique_ptr<Opponent>> opponents)
+Connect4Env::Connect4Env(std::vector<std::unique_ptr<Opponent>> opponents, double random_start_share)
     : spec_{.name = "connect4",
             .observation_size = kObservationSize,
             .actions = {ActionKind::kDiscrete, kColumns},
             .max_episode_steps = kCells / 2,
             .has_score = true,
             .symmetry = MirrorImage()},
-      opponents_(std::move(opponents)) {}
+      opponents_(std::move(opponents)),
+      random_start_share_(random_start_share) {}
 
 void Connect4Env::Reset(std::uint64_t seed, absl::Span<float> observation, absl::Span<float> mask) {
   rng_ = Rng(seed);
   opponent_ = opponents_[rng_.Below(static_cast<std::uint32_t>(opponents_.size()))].get();
-  board_ = Board();
-  if (seed % 2 == 1) board_.Play(opponent_->ChooseColumn(board_, rng_));
+  if (random_start_share_ > 0 && rng_.Uniform() < random_start_share_) {
+    board_ = RandomStart(rng_);
+  } else {
+    board_ = Board();
+    if (seed % 2 == 1) board_.Play(opponent_->ChooseColumn(board_, rng_));
+  }
   WriteObservation(board_, observation, mask);
 }
 

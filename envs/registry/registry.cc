@@ -23,18 +23,18 @@ struct Entry {
   std::string name;
   std::vector<std::string> aliases;
   std::vector<std::string> evaluation_opponents;  // empty for an environment without opponents
-  Made (*make)(absl::string_view name, const std::vector<std::string>& opponents);
+  Made (*make)(absl::string_view name, const EnvOptions& options);
   EnvPresentation presentation = {};
 };
 
 // Makes an environment with the robot that `plan` makes. Robots take no opponents.
 template <bullet::RobotPlan (*plan)()>
-Made MakeRobot(absl::string_view name, const std::vector<std::string>&) {
+Made MakeRobot(absl::string_view name, const EnvOptions&) {
   return std::make_unique<bullet::LocomotionEnv>(std::string(name), plan());
 }
 
-Made MakeConnect4(absl::string_view, const std::vector<std::string>& opponents) {
-  return connect4::Connect4Env::Make(opponents);
+Made MakeConnect4(absl::string_view, const EnvOptions& options) {
+  return connect4::Connect4Env::Make(options.opponents, options.random_start_share);
 }
 
 const std::vector<Entry>& Entries() {
@@ -61,6 +61,12 @@ const Entry* Find(absl::string_view name) {
 
 }  // namespace
 
+EnvOptions TrainingEnv(const EnvConfig& config) {
+  return {.name = config.name(),
+          .opponents = {config.opponents().begin(), config.opponents().end()},
+          .random_start_share = config.random_start_share()};
+}
+
 absl::StatusOr<std::unique_ptr<Env>> MakeEnv(const EnvOptions& options) {
   const Entry* const entry = Find(options.name);
   if (entry == nullptr) {
@@ -72,7 +78,12 @@ absl::StatusOr<std::unique_ptr<Env>> MakeEnv(const EnvOptions& options) {
                                                    absl::StrJoin(options.opponents, "\", \""),
                                                    "\"; leave the list of opponents empty"));
   }
-  return entry->make(entry->name, options.opponents);
+  if (entry->evaluation_opponents.empty() && options.random_start_share > 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("environment ", entry->name, " has no random starts, which are for two-player games; ",
+                     "expected env.random_start_share: 0, found ", options.random_start_share));
+  }
+  return entry->make(entry->name, options);
 }
 
 std::vector<std::string> EnvNames() {

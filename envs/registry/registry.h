@@ -9,6 +9,7 @@
 #include "absl/strings/string_view.h"
 #include "envs/env.h"
 #include "envs/presentation.h"
+#include "proto/config.pb.h"
 
 namespace dbr {
 
@@ -18,10 +19,15 @@ struct EnvOptions {
   // Each episode draws one of them. Empty means the environment's default. Only two-player games have
   // opponents.
   std::vector<std::string> opponents;
+  // The share of episodes that begin in the middle, from 0 to 1. Only two-player games have such.
+  double random_start_share = 0;
 };
 
+// The environment that actors train on.
+EnvOptions TrainingEnv(const EnvConfig& config);
+
 // Makes an environment by its name or alias. Returns InvalidArgument for an unknown environment or opponent,
-// with the known names, and for opponents of an environment that has none.
+// with the known names, and for opponents or random starts of an environment that has none.
 absl::StatusOr<std::unique_ptr<Env>> MakeEnv(const EnvOptions& options);
 
 // All names, sorted. The conformance suite tests each of them.

@@ -43,10 +43,7 @@ struct Arguments : ServiceArguments {
 };
 
 absl::StatusOr<AlgorithmSpec> MakeSpec(const Config& config) {
-  ASSIGN_OR_RETURN(
-      const std::unique_ptr<Env> env,
-      MakeEnv({.name = config.env().name(),
-               .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
+  ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv(TrainingEnv(config.env())));
   ASSIGN_OR_RETURN(const bool bfloat16, UsesBfloat16(config.network()));
   spdlog::info("matrix products: {}", KernelsName(bfloat16));
   return AlgorithmSpec{.env = env->spec().name,

@@ -26,10 +26,7 @@ namespace dbr {
 namespace {
 
 absl::StatusOr<ReplayServerOptions> MakeOptions(const ServiceArguments& arguments, const Config& config) {
-  ASSIGN_OR_RETURN(
-      const std::unique_ptr<Env> env,
-      MakeEnv({.name = config.env().name(),
-               .opponents = {config.env().opponents().begin(), config.env().opponents().end()}}));
+  ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv(TrainingEnv(config.env())));
   ReplayServerOptions options =
       OptionsFrom(config, TransitionLayout::Of(env->spec(), NeedsReturns(config.algorithm())));
   options.store.env = env->spec().name;

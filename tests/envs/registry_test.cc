@@ -47,6 +47,30 @@ TEST(EnvRegistry, AnUnknownOpponentIsAnsweredWithTheKnownOnes) {
               AllOf(HasSubstr("\"mcts\""), HasSubstr("random, one_ply or mcts:N")));
 }
 
+TEST(EnvRegistry, OnlyTwoPlayerGamesHaveRandomStarts) {
+  for (const std::string& name : EnvNames()) {
+    const absl::Status status = MakeEnv({.name = name, .opponents = {}, .random_start_share = 0.5}).status();
+    if (name == "connect4") {
+      EXPECT_TRUE(status.ok()) << status;
+    } else {
+      EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << name;
+      EXPECT_THAT(std::string(status.message()),
+                  AllOf(HasSubstr(name), HasSubstr("expected env.random_start_share: 0, found 0.5")));
+    }
+  }
+}
+
+TEST(EnvRegistry, ActorsTrainOnWhatTheConfigSays) {
+  EnvConfig config;
+  config.set_name("connect4");
+  config.add_opponents("one_ply");
+  config.set_random_start_share(0.25);
+  const EnvOptions options = TrainingEnv(config);
+  EXPECT_EQ(options.name, "connect4");
+  EXPECT_THAT(options.opponents, ElementsAre("one_ply"));
+  EXPECT_EQ(options.random_start_share, 0.25);
+}
+
 TEST(EnvRegistry, TheBoardHasASymmetryAndTheRobotsHaveNone) {
   for (const std::string& name : EnvNames()) {
     EXPECT_EQ(MakeEnv({.name = name, .opponents = {}}).value()->spec().symmetry.empty(), name != "connect4")

@@ -21,7 +21,8 @@ using ::testing::HasSubstr;
 
 // An environment with memory for its outputs.
 struct World {
-  explicit World(std::vector<std::string> opponents) : env(Connect4Env::Make(opponents).value()) {}
+  explicit World(std::vector<std::string> opponents, double random_start_share = 0)
+      : env(Connect4Env::Make(opponents, random_start_share).value()) {}
 
   void Reset(std::uint64_t seed) { env->Reset(seed, absl::MakeSpan(observation), absl::MakeSpan(mask)); }
   StepResult Step(int column) {
@@ -55,6 +56,57 @@ TEST(Connect4Env, TheAgentStartsWithAnEvenSeedAndTheOpponentWithAnOddOne) {
     EXPECT_EQ(world.Stones(0), 0u);
     EXPECT_EQ(std::popcount(world.Stones(1)), seed % 2 == 1 ? 1 : 0) << seed;
     EXPECT_THAT(world.mask, Each(1.0f));
+  }
+}
+
+TEST(Connect4Env, RandomStartsAreAtAllStagesOfAGameThatHasNotEnded) {
+  World world({}, /*random_start_share=*/1);
+  std::array<int, kCells> at_ply = {};
+  int wins = 0, threats = 0;
+  for (std::uint64_t seed = 0; seed < 4000; ++seed) {
+    world.Reset(seed);
+    const Cells own = world.Stones(0), other = world.Stones(1);
+    const int lead = std::popcount(other) - std::popcount(own);
+    ASSERT_TRUE(lead == 0 || lead == 1) << seed;  // the agent is to move
+    ASSERT_FALSE(HasFour(own) || HasFour(other)) << seed;
+    const Cells landing = LandingCells(own | other);
+    ASSERT_NE(landing, 0u) << seed;
+    bool wins_here = false, threatened = false;
+    for (int column = 0; column < kColumns; ++column) {
+      const Cells cell = landing & (Cells{0x3f} << (kColumnStride * column));
+      EXPECT_EQ(world.mask[column] == 1.0f, cell != 0) << seed;
+      wins_here |= HasFour(own | cell);
+      threatened |= HasFour(other | cell);
+    }
+    wins += wins_here;
+    threats += threatened && !wins_here;
+    ++at_ply[std::popcount(own | other)];
+  }
+  // A game of random moves has about 21, so each of the first plies is met once in about 20 games.
+  EXPECT_GT(at_ply[0], 100);
+  EXPECT_GT(at_ply[1], 100);
+  EXPECT_GT(std::accumulate(at_ply.begin() + 18, at_ply.end(), 0), 500);
+  EXPECT_GT(std::accumulate(at_ply.begin() + 30, at_ply.end(), 0), 40);
+  EXPECT_GT(wins, 200);
+  EXPECT_GT(threats, 200);
+}
+
+TEST(Connect4Env, TheShareOfRandomStartsIsAsStated) {
+  World world({}, /*random_start_share=*/0.25);
+  int later = 0;
+  for (std::uint64_t seed = 0; seed < 4000; ++seed) {
+    world.Reset(seed);
+    later += std::popcount(world.Stones(0) | world.Stones(1)) > 1;
+  }
+  EXPECT_NEAR(later / 4000.0, 0.25 * 0.9, 0.03);  // one random start in ten is at the first two plies
+}
+
+TEST(Connect4Env, AGameFromARandomStartIsPlayedToItsEnd) {
+  World world({"one_ply"}, /*random_start_share=*/1);
+  for (std::uint64_t seed = 0; seed < 500; ++seed) {
+    world.Reset(seed);
+    int steps = 0;
+    while (!world.Step(world.FirstLegal()).done()) ASSERT_LT(++steps, kCells / 2) << seed;
   }
 }
 

@@ -24,7 +24,7 @@ using google::protobuf::FieldDescriptor;
 const std::map<std::string, std::vector<std::string>>& Readers() {
   static const auto* const readers = new std::map<std::string, std::vector<std::string>>{
       {"Config", {"actor", "learner", "replay", "deploy"}},
-      {"EnvConfig", {"actor", "learner", "replay", "deploy"}},
+      {"EnvConfig", {"envs", "actor", "learner", "replay", "deploy"}},
       {"NetworkConfig", {"learner", "nn", "proto"}},
       {"AlgorithmConfig", {"actor", "learner", "replay"}},
       {"DbrConfig", {"learner", "replay"}},
