@@ -2,16 +2,13 @@
 
 #include <cmath>
 
-#include "core/check.h"
 #include "nn/keep_nan.h"
 #include "nn/not_finite.h"
 
 namespace dbr {
 
 void ContinuousActor::Evaluate(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations) {
-  head_.Split(MlpForward<float>(policy.policy_shape(), policy.snapshot().Find(kPolicyNetwork)->data(),
-                                observations, &policy_activations_),
-              kPolicyLogStd);
+  head_.Split(policy.Run(kPolicyNetwork, observations, &policy_activations_), kPolicyLogStd);
 }
 
 absl::Status ContinuousActor::Act(const PolicyNetworks& policy, ActingMode mode,
@@ -55,9 +52,7 @@ const MatrixX<float>& ContinuousActor::Critic(const PolicyNetworks& policy, cons
     inputs_.block(0, first, observations.rows(), n) = observations;
   }
   inputs_.bottomRows(actions.rows()) = actions;
-  const std::vector<float>* parameters = policy.snapshot().Find(name);
-  DBR_CHECK(parameters != nullptr);
-  return MlpForward<float>(policy.critic_shape(), parameters->data(), inputs_, &critic_activations_);
+  return policy.Run(name, inputs_, &critic_activations_);
 }
 
 absl::Status ContinuousActor::ChooseGreedy(const PolicyNetworks& policy,

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "core/check.h"
 #include "nn/keep_nan.h"
 #include "nn/not_finite.h"
 
@@ -51,24 +50,17 @@ int SupportAction(const PolicyView& view, const ConstMatrixRef<float>& masks, fl
 
 }  // namespace
 
-const MatrixX<float>& DiscreteActor::Run(const PolicyNetworks& policy, const char* name,
-                                         const ConstMatrixRef<float>& observations) {
-  const std::vector<float>* parameters = policy.snapshot().Find(name);
-  DBR_CHECK(parameters != nullptr);
-  return MlpForward(policy.policy_shape(), parameters->data(), observations, &activations_);
-}
-
 void DiscreteActor::RunCategorical(const PolicyNetworks& policy, const char* name,
                                    const ConstMatrixRef<float>& observations,
                                    const ConstMatrixRef<float>& masks, MatrixX<float>* probabilities) {
-  MaskedSoftmax<float>(Run(policy, name, observations), masks, &distribution_);
+  MaskedSoftmax<float>(policy.Run(name, observations, &activations_), masks, &distribution_);
   probabilities->swap(distribution_.probabilities);
 }
 
 void DiscreteActor::RunCritics(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations) {
   if (policy.has_critics()) {
-    view_.q = Run(policy, kCritic1, observations);
-    view_.q = EachSmallerOrNan(view_.q, Run(policy, kCritic2, observations));
+    view_.q = policy.Run(kCritic1, observations, &critic_activations_);
+    view_.q = EachSmallerOrNan(view_.q, policy.Run(kCritic2, observations, &critic_activations_));
   } else {
     view_.q.resize(0, 0);
   }

@@ -25,9 +25,6 @@ class DiscreteActor {
                          const ConstMatrixRef<float>& masks);
 
  private:
-  // The output [actions x n] of one network, valid until the next call.
-  const MatrixX<float>& Run(const PolicyNetworks& policy, const char* name,
-                            const ConstMatrixRef<float>& observations);
   // The probabilities [actions x n] of one network over the legal actions.
   void RunCategorical(const PolicyNetworks& policy, const char* name,
                       const ConstMatrixRef<float>& observations, const ConstMatrixRef<float>& masks,
@@ -37,7 +34,7 @@ class DiscreteActor {
   void RunDualBehavior(const PolicyNetworks& policy, const ConstMatrixRef<float>& observations,
                        const ConstMatrixRef<float>& masks);
 
-  MlpActivations<float> activations_;
+  MlpActivations<float> activations_, critic_activations_;
   Categorical<float> distribution_;
   PolicyView view_;
 };

@@ -1,6 +1,7 @@
 #include "nn/policy_networks.h"
 
 #include "absl/strings/str_cat.h"
+#include "core/check.h"
 
 namespace dbr {
 namespace {
@@ -39,8 +40,7 @@ absl::StatusOr<std::shared_ptr<const PolicyNetworks>> PolicyNetworks::Create(Pol
   }
   const std::shared_ptr<const PolicyNetworks> policy(new PolicyNetworks(std::move(snapshot)));
   for (const auto& [name, parameters] : policy->snapshot_.networks) {
-    Eigen::Index expected = policy->policy_shape_.parameter_count();
-    if (name == kCritic1 || name == kCritic2) expected = policy->critic_shape_.parameter_count();
+    Eigen::Index expected = policy->ShapeOf(name).parameter_count();
     if (name == kObservationNormalizer) expected = 2 * policy->spec().observation_size;
     if (parameters.size() == static_cast<std::size_t>(expected)) continue;
     return absl::InvalidArgumentError(absl::StrCat("network '", name, "': expected ", expected,
@@ -53,6 +53,17 @@ PolicyNetworks::PolicyNetworks(PolicySnapshot snapshot)
     : snapshot_(std::move(snapshot)),
       policy_shape_(PolicyShape(snapshot_.spec)),
       critic_shape_(CriticShape(snapshot_.spec)) {}
+
+const MlpShape& PolicyNetworks::ShapeOf(absl::string_view network) const {
+  return network == kCritic1 || network == kCritic2 ? critic_shape_ : policy_shape_;
+}
+
+const MatrixX<float>& PolicyNetworks::Run(absl::string_view network, const ConstMatrixRef<float>& x,
+                                          MlpActivations<float>* activations) const {
+  const std::vector<float>* parameters = snapshot_.Find(network);
+  DBR_CHECK(parameters != nullptr);
+  return MlpForward<float>(ShapeOf(network), parameters->data(), x, activations);
+}
 
 bool PolicyNetworks::has_critics() const {
   return snapshot_.Find(kCritic1) != nullptr && snapshot_.Find(kCritic2) != nullptr;

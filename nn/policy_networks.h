@@ -5,6 +5,7 @@
 #include <string>
 
 #include "absl/status/statusor.h"
+#include "absl/strings/string_view.h"
 #include "core/batch.h"
 #include "core/policy_snapshot.h"
 #include "nn/mlp.h"
@@ -26,8 +27,12 @@ class PolicyNetworks {
 
   const PolicySnapshot& snapshot() const { return snapshot_; }
   const PolicySpec& spec() const { return snapshot_.spec; }
-  const MlpShape& policy_shape() const { return policy_shape_; }
-  const MlpShape& critic_shape() const { return critic_shape_; }
+  // The layers of a network by its name: those of CriticShape for the critics, else those of PolicyShape.
+  const MlpShape& ShapeOf(absl::string_view network) const;
+  // Returns the output [output x n] of a network by its name, for x [input x n]. It is valid until the next
+  // call with the same workspace. Requires a network of that name.
+  const MatrixX<float>& Run(absl::string_view network, const ConstMatrixRef<float>& x,
+                            MlpActivations<float>* activations) const;
   bool has_critics() const;        // both twins
   bool has_dual_behavior() const;  // beta+ and beta-
   bool has_behavior() const;       // one beta, fitted to all the data

@@ -103,6 +103,39 @@ TEST_F(Acting, TheValueOfAStateIsTheSmallerTwinsMeanUnderThePolicy) {
   EXPECT_TRUE(std::isnan(values[0]) && std::isnan(values[1]));
 }
 
+// What acting and its labels see must be the critics that were trained, normalised or not.
+TEST(ActingByCritics, TheirHiddenLayersAreNormalisedWhereTheyWereInTraining) {
+  for (const bool layer_norm : {false, true}) {
+    PolicySnapshot snapshot;
+    snapshot.spec = {.env = "test",
+                     .algorithm = "dbr",
+                     .observation_size = 5,
+                     .actions = {ActionKind::kDiscrete, 4},
+                     .hidden_sizes = {8, 6},
+                     .critic_layer_norm = layer_norm};
+    Rng rng(3);
+    const MlpShape critic(5, {8, 6}, 4, layer_norm);
+    VectorX<float> twins[2];
+    const VectorX<float> pi = InitialParameters<float>(MlpShape(5, {8, 6}, 4), rng);
+    snapshot.networks.emplace_back(kPolicyNetwork, std::vector<float>(pi.begin(), pi.end()));
+    for (int i = 0; i < 2; ++i) {
+      twins[i] = InitialParameters<float>(critic, rng);
+      snapshot.networks.emplace_back(i == 0 ? kCritic1 : kCritic2,
+                                     std::vector<float>(twins[i].begin(), twins[i].end()));
+    }
+    const auto policy = PolicyNetworks::Create(snapshot);
+    ASSERT_TRUE(policy.ok()) << policy.status();
+    MatrixX<float> x(5, 3);
+    for (float& entry : x.reshaped()) entry = static_cast<float>(rng.Normal());
+    MlpActivations<float> first, second;
+    const MatrixX<float> expected = MlpForward<float>(critic, twins[0].data(), x, &first)
+                                        .cwiseMin(MlpForward<float>(critic, twins[1].data(), x, &second));
+    PolicyRunner runner;
+    const MatrixX<float> q = runner.View(**policy, x, MatrixX<float>::Ones(4, 3)).q;
+    EXPECT_LT((q - expected).cwiseAbs().maxCoeff(), 1e-5f) << "layer norm " << layer_norm;
+  }
+}
+
 TEST_F(Acting, AMissingNetworkIsNamed) {
   snapshot_.networks.resize(1);
   Act(GREEDY_Q, {1, 1, 1, 1});

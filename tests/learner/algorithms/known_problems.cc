@@ -122,34 +122,30 @@ MatrixX<float> TrainedOnProblem::Act(ActingMode mode) {
   return actions;
 }
 
-MatrixX<float> TrainedOnProblem::Output(const std::string& network, const MatrixX<float>& input,
-                                        const MlpShape& shape) const {
-  const std::vector<float>* parameters = policy_->snapshot().Find(network);
-  EXPECT_NE(parameters, nullptr) << network;
+MatrixX<float> TrainedOnProblem::Output(const std::string& network, const MatrixX<float>& input) const {
   MlpActivations<float> activations;
-  return MlpForward<float>(shape, parameters->data(), input, &activations);
+  return policy_->Run(network, input, &activations);
 }
 
 double TrainedOnProblem::Value(int state, double action) {
   const bool discrete = problem_.actions.discrete();
-  MatrixX<float> input = MatrixX<float>::Zero(policy_->critic_shape().input_size(), 1);
+  MatrixX<float> input = MatrixX<float>::Zero(policy_->ShapeOf(kCritic1).input_size(), 1);
   input(state, 0) = 1;
   if (!discrete) input(problem_.states, 0) = static_cast<float>(action);
   const Eigen::Index row = discrete ? static_cast<Eigen::Index>(action) : 0;
-  return std::min(Output(kCritic1, input, policy_->critic_shape())(row, 0),
-                  Output(kCritic2, input, policy_->critic_shape())(row, 0));
+  return std::min(Output(kCritic1, input)(row, 0), Output(kCritic2, input)(row, 0));
 }
 
 double TrainedOnProblem::Probability(const std::string& network, int state, int action) {
   const MatrixX<float> states = MatrixX<float>::Identity(problem_.states, problem_.states);
   Categorical<float> distribution;
-  MaskedSoftmax<float>(Output(network, states, policy_->policy_shape()), Masks(), &distribution);
+  MaskedSoftmax<float>(Output(network, states), Masks(), &distribution);
   return distribution.probabilities(action, state);
 }
 
 double TrainedOnProblem::Mean(const std::string& network, int state) {
   const MatrixX<float> states = MatrixX<float>::Identity(problem_.states, problem_.states);
-  return std::tanh(Output(network, states, policy_->policy_shape())(0, state));
+  return std::tanh(Output(network, states)(0, state));
 }
 
 }  // namespace dbr

@@ -50,7 +50,7 @@ class TrainedOnProblem {
 
  private:
   MatrixX<float> Masks() const;  // [actions x states], [0 x states] where continuous
-  MatrixX<float> Output(const std::string& network, const MatrixX<float>& input, const MlpShape& shape) const;
+  MatrixX<float> Output(const std::string& network, const MatrixX<float>& input) const;
 
   const KnownProblem problem_;
   std::unique_ptr<Algorithm> algorithm_;
