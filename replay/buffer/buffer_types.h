@@ -1,6 +1,7 @@
 // The arguments and results of the replay buffer's calls, as plain values.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -15,14 +16,28 @@
 
 namespace dbr {
 
+// The share of the seed buffer's rows in a draw from D, D+ or D-, while the part holds rows of both kinds.
+struct SeedBufferShare {
+  double first = 0;              // 0 without `decay_rows`: as the numbers of rows in the part have it
+  double final = 0;              // after decay_rows rows beside the seed buffer have been inserted
+  std::uint64_t decay_rows = 0;  // over which it moves linearly from `first` to `final`; 0: it stays
+
+  bool follows_sizes() const { return first == 0 && decay_rows == 0; }
+  // The share once `inserted` rows beside the seed buffer have been inserted.
+  double At(std::uint64_t inserted) const {
+    if (decay_rows == 0) return first;
+    const double done = static_cast<double>(std::min(inserted, decay_rows)) / static_cast<double>(decay_rows);
+    return first + done * (final - first);
+  }
+};
+
 struct BufferOptions {
   RateLimiterOptions limiter;
   // A relabel with `a` gives max(A, 0) + a in place of a, where A is the label before.
   bool cumulative_advantage = false;
   // D- holds the rows with an advantage of -minus_margin or less.
   double minus_margin = 0;
-  // Share of the seed buffer's rows in a draw from D, while D holds others too; 0: as their numbers have it.
-  double seed_buffer_share = 0;
+  SeedBufferShare seed_buffer_share;
   std::uint64_t seed = 1;                       // of the random numbers
   std::function<absl::Time()> now = absl::Now;  // for rates and the uptime
 };

@@ -38,7 +38,7 @@ absl::Status PartitionedRows::CheckHasPlace() const {
 void PartitionedRows::Evict() {
   const std::uint32_t slot = store_.SlotOf(store_.oldest_key());
   const RowLabels& labels = store_.labels(slot);
-  partitions_.Remove(slot, labels.advantage, labels.source);
+  partitions_.Remove(slot, labels.advantage);
   store_.writers().AddHeld(labels.writer, -1);
   store_.Evict();
 }

@@ -33,25 +33,23 @@ class Partitions {
   // A row with its advantage (NaN: not yet judged) enters, leaves, or has its advantage changed from
   // `old_advantage`.
   void Add(std::uint32_t slot, float advantage, Source source) {
-    parts_[kAll].Insert(slot);
+    parts_[kAll].Insert(slot, source == Source::kSeedBuffer);
     Join(slot, advantage, source);
-    seed_buffer_[kAll] += source == Source::kSeedBuffer;
   }
-  void Remove(std::uint32_t slot, float advantage, Source source) {
+  void Remove(std::uint32_t slot, float advantage) {
     parts_[kAll].Remove(slot);
-    Leave(slot, advantage, source);
-    seed_buffer_[kAll] -= source == Source::kSeedBuffer;
+    Leave(slot, advantage);
   }
   void Relabel(std::uint32_t slot, float old_advantage, float advantage, Source source) {
     if (Code(old_advantage) == Code(advantage)) return;
-    Leave(slot, old_advantage, source);
+    Leave(slot, old_advantage);
     Join(slot, advantage, source);
   }
 
   const SlotSet& operator[](int part) const { return parts_[part]; }
   std::uint32_t size(int part) const { return parts_[part].size(); }
   // Rows of the part that are the seed buffer's.
-  std::uint64_t seed_buffer(int part) const { return seed_buffer_[part]; }
+  std::uint64_t seed_buffer(int part) const { return parts_[part].seed_buffer(); }
 
  private:
   // The parts beside D that a row of that advantage lies in, as bits.
@@ -61,22 +59,17 @@ class Partitions {
   }
   void Join(std::uint32_t slot, float advantage, Source source) {
     for (int part = kPlus; part < kAllParts; ++part) {
-      if ((Code(advantage) >> part & 1) == 0) continue;
-      parts_[part].Insert(slot);
-      seed_buffer_[part] += source == Source::kSeedBuffer;
+      if ((Code(advantage) >> part & 1) != 0) parts_[part].Insert(slot, source == Source::kSeedBuffer);
     }
   }
-  void Leave(std::uint32_t slot, float advantage, Source source) {
+  void Leave(std::uint32_t slot, float advantage) {
     for (int part = kPlus; part < kAllParts; ++part) {
-      if ((Code(advantage) >> part & 1) == 0) continue;
-      parts_[part].Remove(slot);
-      seed_buffer_[part] -= source == Source::kSeedBuffer;
+      if ((Code(advantage) >> part & 1) != 0) parts_[part].Remove(slot);
     }
   }
 
   const float margin_;
   std::array<SlotSet, kAllParts> parts_;
-  std::array<std::uint64_t, kAllParts> seed_buffer_{};
 };
 
 }  // namespace dbr

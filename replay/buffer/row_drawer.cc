@@ -5,25 +5,22 @@
 
 namespace dbr {
 
-RowDrawer::RowDrawer(double seed_buffer_share, std::uint64_t seed, const TransitionStore* store,
+RowDrawer::RowDrawer(const SeedBufferShare& share, std::uint64_t seed, const TransitionStore* store,
                      const Partitions* partitions)
-    : seed_buffer_share_(seed_buffer_share), store_(*store), partitions_(*partitions), rng_(seed) {}
+    : share_(share), store_(*store), partitions_(*partitions), rng_(seed) {}
 
-// A share is drawn by row numbers: the rows of each kind have numbers without gaps, the seed buffer's first.
 void RowDrawer::ChooseSlots(int part, std::uint32_t count) {
   slots_.resize(count);
-  const auto seed_buffer = static_cast<std::uint32_t>(store_.seed_buffer_held());
-  const std::uint32_t others = partitions_.size(kAll) - seed_buffer;
-  if (part != kAll || seed_buffer_share_ == 0 || seed_buffer == 0 || others == 0) {
-    for (auto& slot : slots_) slot = partitions_[part].Draw(&rng_);
+  const SlotSet& members = partitions_[part];
+  if (share_.follows_sizes() || members.seed_buffer() == 0 || members.others() == 0) {
+    for (std::uint32_t& slot : slots_) slot = members.Draw(&rng_);
     return;
   }
   // The expected number of seed buffer rows is exact: what is left of a whole number is drawn by chance.
-  const auto from_seed_buffer = static_cast<std::size_t>(seed_buffer_share_ * count + rng_.Uniform());
+  const auto of_seed_buffer =
+      static_cast<std::size_t>(share_.At(store_.online_inserted()) * count + rng_.Uniform());
   for (std::size_t i = 0; i < count; ++i) {
-    const std::uint64_t rank =
-        i < from_seed_buffer ? rng_.Below(seed_buffer) : seed_buffer + rng_.Below(others);
-    slots_[i] = store_.SlotOf(store_.KeyAtRank(rank));
+    slots_[i] = i < of_seed_buffer ? members.DrawSeedBuffer(&rng_) : members.DrawOther(&rng_);
   }
 }
 

@@ -5,20 +5,20 @@
 #include <vector>
 
 #include "core/rng.h"
+#include "replay/buffer/buffer_types.h"
 #include "replay/buffer/columns.h"
 #include "replay/buffer/partitions.h"
 #include "replay/store/transition_store.h"
 
 namespace dbr {
 
-// Chooses rows of a partition with replacement, each with the same probability, and copies them. In draws
-// from D the share of the seed buffer may be set apart from its size. Allocates nothing once the counts have
-// settled. Thread-compatible: the buffer's mutex guards it, with the store and the partitions.
+// Chooses rows of a partition with replacement, each with the same probability, and copies them. The share of
+// the seed buffer may be set apart from its size. Allocates nothing once the counts have settled.
+// Thread-compatible: the buffer's mutex guards it, with the store and the partitions.
 class RowDrawer {
  public:
-  // `seed_buffer_share`: of a draw from D while D holds both kinds of rows; 0: as their numbers have it.
   // `seed`: of the random numbers. `store` and `partitions` are not owned and outlive this.
-  RowDrawer(double seed_buffer_share, std::uint64_t seed, const TransitionStore* store,
+  RowDrawer(const SeedBufferShare& share, std::uint64_t seed, const TransitionStore* store,
             const Partitions* partitions);
 
   // Writes `count` rows of `part` (Part), and their keys, to the first `count` places of each column of
@@ -29,7 +29,7 @@ class RowDrawer {
   // Fills slots_.
   void ChooseSlots(int part, std::uint32_t count);
 
-  const double seed_buffer_share_;
+  const SeedBufferShare share_;
   const TransitionStore& store_;
   const Partitions& partitions_;
   Rng rng_;

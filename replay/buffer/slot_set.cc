@@ -15,19 +15,30 @@ SlotSet::SlotSet(std::uint32_t capacity) : places_(capacity, kAbsent) {
   members_.reserve(capacity);
 }
 
-void SlotSet::Insert(std::uint32_t slot) {
+void SlotSet::Put(std::uint32_t slot, std::uint32_t place) {
+  members_[place] = slot;
+  places_[slot] = place;
+}
+
+void SlotSet::Insert(std::uint32_t slot, bool of_seed_buffer) {
   DBR_CHECK(slot < places_.size() && places_[slot] == kAbsent);
-  places_[slot] = size();
   members_.push_back(slot);
+  if (!of_seed_buffer) return Put(slot, size() - 1);
+  // The first of the others makes room at the end of the seed buffer's.
+  Put(members_[seed_buffer_], size() - 1);
+  Put(slot, seed_buffer_++);
 }
 
 void SlotSet::Remove(std::uint32_t slot) {
   DBR_CHECK(Contains(slot));
-  const std::uint32_t last = members_.back();
-  members_[places_[slot]] = last;
-  places_[last] = places_[slot];
-  places_[slot] = kAbsent;
+  std::uint32_t gap = places_[slot];
+  if (gap < seed_buffer_) {
+    Put(members_[--seed_buffer_], gap);
+    gap = seed_buffer_;
+  }
+  if (gap + 1 < size()) Put(members_.back(), gap);
   members_.pop_back();
+  places_[slot] = kAbsent;
 }
 
 bool SlotSet::Contains(std::uint32_t slot) const {

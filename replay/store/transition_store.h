@@ -58,11 +58,8 @@ class TransitionStore {
   // them with `pin`.
   void CompleteSeedBuffer(SeedBufferRecord record, bool pin);
   const SeedBufferRecord& seed_buffer() const { return *seed_buffer_; }  // zeros before CompleteSeedBuffer
-  // Rows of the seed buffer that ever came in, and those that are still held.
+  // Rows of the seed buffer that ever came in.
   std::uint64_t seed_buffer_rows() const { return seed_buffer_rows_; }
-  std::uint64_t seed_buffer_held() const {
-    return pinned_ > 0 ? pinned_ : seed_buffer_rows_ - std::min(seed_buffer_rows_, oldest_key() - 1);
-  }
 
   bool Holds(std::uint64_t key) const {
     return (key >= oldest_key() && key < next_key_) || (key >= 1 && key <= pinned_);

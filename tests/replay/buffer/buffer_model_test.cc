@@ -21,6 +21,7 @@ namespace {
 
 constexpr std::uint64_t kCapacity = 50;
 constexpr int kWriters = 3;
+constexpr int kSeedWriter = 0x5eed - 100;  // in the model; the buffer's id for a writer is 100 more
 
 // A model of what the buffer promises, as simple as it can be.
 struct Model {
@@ -39,8 +40,13 @@ struct Model {
       return;
     }
     last_sequence[writer] = sequence;
-    rows.push_back({++inserted, writer, value, advantage, version});
-    if (rows.size() > kCapacity) rows.pop_front();
+    ++inserted;
+    rows.push_back({++newest_key, writer, value, advantage, version});
+    if (rows.size() <= kCapacity) return;
+    rows.erase(std::find_if(rows.begin(), rows.end(), [](const Row& r) { return r.writer != kSeedWriter; }));
+  }
+  void InsertSeedBuffer(std::uint64_t value) {
+    rows.push_back({++newest_key, kSeedWriter, value, kUnjudged, 0});
   }
   void Relabel(std::uint64_t key, float advantage, std::uint64_t version) {
     const auto row = std::find_if(rows.begin(), rows.end(), [key](const Row& r) { return r.key == key; });
@@ -59,9 +65,13 @@ struct Model {
            (part == kMinus && row.advantage <= -margin) ||
            (part == kUnjudgedPart && std::isnan(row.advantage));
   }
-  std::uint64_t Size(int part) const {
-    return static_cast<std::uint64_t>(
-        std::count_if(rows.begin(), rows.end(), [&](const Row& row) { return InPart(row, part); }));
+  std::uint64_t Size(int part) const { return SeedBuffer(part) + Others(part); }
+  std::uint64_t SeedBuffer(int part) const { return Count(part, /*of_seed_buffer=*/true); }
+  std::uint64_t Others(int part) const { return Count(part, /*of_seed_buffer=*/false); }
+  std::uint64_t Count(int part, bool of_seed_buffer) const {
+    return static_cast<std::uint64_t>(std::count_if(rows.begin(), rows.end(), [&](const Row& row) {
+      return InPart(row, part) && (row.writer == kSeedWriter) == of_seed_buffer;
+    }));
   }
   const Row* Find(std::uint64_t key) const {
     const auto row = std::find_if(rows.begin(), rows.end(), [key](const Row& r) { return r.key == key; });
@@ -72,11 +82,12 @@ struct Model {
   float margin = 0;  // of D-
   std::deque<Row> rows;
   std::map<int, std::uint64_t> last_sequence;
-  std::uint64_t inserted = 0, duplicates = 0, relabelled = 0, relabel_evicted = 0, relabel_stale = 0;
+  std::uint64_t newest_key = 0, inserted = 0, duplicates = 0, relabelled = 0, relabel_evicted = 0,
+                relabel_stale = 0;
 };
 
-// Parameters: seed, cumulative advantages, the margin of D-.
-class BufferAgainstModel : public ::testing::TestWithParam<std::tuple<int, bool, float>> {
+// Parameters: random seed, cumulative advantages, the margin of D-, rows of a pinned seed buffer.
+class BufferAgainstModel : public ::testing::TestWithParam<std::tuple<int, bool, float, int>> {
  protected:
   BufferAgainstModel() : rng_(static_cast<std::uint64_t>(std::get<0>(GetParam()))) {
     model_.cumulative = std::get<1>(GetParam());
@@ -86,6 +97,19 @@ class BufferAgainstModel : public ::testing::TestWithParam<std::tuple<int, bool,
     store_options_.layout = kSmallLayout;
     store_options_.capacity = kCapacity;
     Reopen();
+    InsertSeedBuffer(std::get<3>(GetParam()));
+  }
+
+  void InsertSeedBuffer(int count) {
+    if (count == 0) return;
+    const Rows rows(kSmallLayout, next_value_, count);
+    std::vector<float> flat;
+    for (int i = 0; i < count; ++i) {
+      rows.AppendFlat(i, &flat);
+      model_.InsertSeedBuffer(next_value_++);
+    }
+    ASSERT_TRUE(buffer_->InsertSeedBuffer(flat).ok());
+    ASSERT_TRUE(buffer_->CompleteSeedBuffer({}, /*pin=*/true).ok());
   }
 
   void Reopen() {
@@ -95,6 +119,7 @@ class BufferAgainstModel : public ::testing::TestWithParam<std::tuple<int, bool,
     BufferOptions options;
     options.cumulative_advantage = model_.cumulative;
     options.minus_margin = model_.margin;
+    options.seed_buffer_share = share_;
     options.seed = rng_();
     auto buffer = PartitionedBuffer::Make(std::move(*store), options);
     ASSERT_TRUE(buffer.ok()) << buffer.status();
@@ -134,7 +159,7 @@ class BufferAgainstModel : public ::testing::TestWithParam<std::tuple<int, bool,
     std::vector<std::uint64_t> keys;
     std::vector<float> advantages;
     for (int i = 0; i < count; ++i) {
-      keys.push_back(rng_.Below(static_cast<std::uint32_t>(model_.inserted) + 3));
+      keys.push_back(rng_.Below(static_cast<std::uint32_t>(model_.newest_key) + 3));
       advantages.push_back(RandomAdvantage());
       model_.Relabel(keys.back(), advantages.back(), version);
     }
@@ -154,12 +179,17 @@ class BufferAgainstModel : public ::testing::TestWithParam<std::tuple<int, bool,
     for (int part = 0; part < kDrawnParts; ++part) {
       ASSERT_EQ(result.drawn[part], model_.Size(part) > 0 ? kDraws : 0);
       parts[part].ExpectWhole(result.drawn[part]);
+      double of_seed_buffer = 0;
       for (std::uint32_t i = 0; i < result.drawn[part]; ++i) {
         const Model::Row* row = model_.Find(parts[part].keys[i]);
         ASSERT_NE(row, nullptr);
         ASSERT_TRUE(model_.InPart(*row, part));
         ASSERT_EQ(parts[part].rewards[i], Rows::Value(row->value));
+        of_seed_buffer += row->writer == kSeedWriter;
       }
+      if (model_.SeedBuffer(part) == 0 || model_.Others(part) == 0) continue;
+      const double moved = std::min(1.0, static_cast<double>(model_.inserted) / 400);
+      ASSERT_LT(std::abs(of_seed_buffer - kDraws * (0.9 - 0.6 * moved)), 1) << part;
     }
   }
 
@@ -169,8 +199,11 @@ class BufferAgainstModel : public ::testing::TestWithParam<std::tuple<int, bool,
     ASSERT_EQ(stats.plus, model_.Size(kPlus));
     ASSERT_EQ(stats.minus, model_.Size(kMinus));
     ASSERT_EQ(stats.unjudged, model_.Size(kUnjudgedPart));
+    ASSERT_EQ(stats.seed_buffer, model_.SeedBuffer(kAll));
+    ASSERT_EQ(stats.seed_buffer_plus, model_.SeedBuffer(kPlus));
+    ASSERT_EQ(stats.seed_buffer_minus, model_.SeedBuffer(kMinus));
     ASSERT_EQ(stats.inserted, model_.inserted);
-    ASSERT_EQ(stats.evicted, model_.inserted - model_.rows.size());
+    ASSERT_EQ(stats.evicted, model_.newest_key - model_.rows.size());
     ASSERT_EQ(stats.counters.duplicates, model_.duplicates);
     ASSERT_EQ(stats.counters.relabelled, model_.relabelled);
     ASSERT_EQ(stats.counters.relabel_evicted, model_.relabel_evicted);
@@ -183,6 +216,7 @@ class BufferAgainstModel : public ::testing::TestWithParam<std::tuple<int, bool,
     }
   }
 
+  const SeedBufferShare share_ = {.first = 0.9, .final = 0.3, .decay_rows = 400};
   Rng rng_;
   Model model_;
   TestFolder folder_;
@@ -210,7 +244,7 @@ TEST_P(BufferAgainstModel, AgreesAfterEveryStep) {
 }
 INSTANTIATE_TEST_SUITE_P(Seeds, BufferAgainstModel,
                          ::testing::Combine(::testing::Values(1, 2, 3), ::testing::Bool(),
-                                            ::testing::Values(0.0f, 1.0f)));
+                                            ::testing::Values(0.0f, 1.0f), ::testing::Values(0, 20)));
 
 // Writers, a learner that draws and relabels, and a watcher, all at once, with the limiter between them.
 TEST(BufferUnderThreads, KeepsItsPromises) {

@@ -36,10 +36,9 @@ class BufferWithSeedBuffer : public Buffer {
     ASSERT_TRUE(InsertSeedBuffer(1, rows).ok());
     ASSERT_TRUE(buffer_->CompleteSeedBuffer({.episodes = 4, .return_mean = 12.5}, pin).ok());
   }
-  // How many of the first `count` rows drawn from D are the seed buffer's, whose transitions are 1 to `rows`.
-  std::int64_t SeedBufferAmong(std::size_t count, float rows) const {
-    return std::count_if(uniform_.rewards.begin(),
-                         uniform_.rewards.begin() + static_cast<std::ptrdiff_t>(count),
+  // How many of the first `count` drawn rows are the seed buffer's, whose transitions are 1 to `rows`.
+  static std::int64_t SeedBufferAmong(const Drawn& drawn, std::size_t count, float rows) {
+    return std::count_if(drawn.rewards.begin(), drawn.rewards.begin() + static_cast<std::ptrdiff_t>(count),
                          [rows](float reward) { return reward <= rows; });
   }
 };
@@ -104,27 +103,54 @@ TEST_F(BufferWithSeedBuffer, PartitionsHoldBothKinds) {
 }
 
 TEST_F(BufferWithSeedBuffer, TheShareOfSeedInADrawIsASetting) {
-  buffer_options_.seed_buffer_share = 0.25;
+  buffer_options_.seed_buffer_share.first = 0.25;
   MakeSeeded(60);
   ASSERT_TRUE(Draw(1000, 0, 0).ok());
-  EXPECT_EQ(SeedBufferAmong(1000, 60), 1000) << "there is nothing else yet";
+  EXPECT_EQ(SeedBufferAmong(uniform_, 1000, 60), 1000) << "there is nothing else yet";
   ASSERT_TRUE(Insert(1001, 5, 1).ok());
   ASSERT_TRUE(Draw(1000, 0, 0).ok());
-  EXPECT_EQ(SeedBufferAmong(1000, 60), 250);
+  EXPECT_EQ(SeedBufferAmong(uniform_, 1000, 60), 250);
   uniform_.ExpectWhole(1000);
   int drawn = 0, of_seed_buffer = 0;  // of draws too small for a whole row of the seed buffer, by chance
   for (; drawn < 1000; ++drawn) {
     ASSERT_TRUE(Draw(1, 0, 0).ok());
-    of_seed_buffer += static_cast<int>(SeedBufferAmong(1, 60));
+    of_seed_buffer += static_cast<int>(SeedBufferAmong(uniform_, 1, 60));
   }
   EXPECT_NEAR(of_seed_buffer, 250, 70);
+}
+
+TEST_F(BufferWithSeedBuffer, TheShareHoldsInEachPartThatHasBothKinds) {
+  buffer_options_.seed_buffer_share.first = 0.75;
+  MakeSeeded(60);
+  ASSERT_TRUE(Insert(1001, 30, 1).ok());  // all in D+
+  Relabel(1, {1, 2, 3, 4}, {1, -1, -1, -1});
+  ASSERT_TRUE(Draw(1000, 1000, 1000).ok());
+  EXPECT_EQ(SeedBufferAmong(uniform_, 1000, 60), 750);
+  EXPECT_EQ(SeedBufferAmong(plus_, 1000, 60), 750) << "of one row of the seed buffer and 30 others";
+  EXPECT_EQ(SeedBufferAmong(minus_, 1000, 60), 1000) << "there is nothing else in D-";
+}
+
+TEST_F(BufferWithSeedBuffer, TheShareMayMoveWithTheRowsThatComeIn) {
+  buffer_options_.seed_buffer_share = {.first = 1, .final = 0.2, .decay_rows = 40};
+  MakeSeeded(60);
+  const int shares[] = {1000, 800, 600, 400, 200, 200, 200};  // after 0, 10, 20, ... rows
+  for (int i = 1; i <= 6; ++i) {
+    ASSERT_TRUE(Insert(static_cast<std::uint64_t>(991 + 10 * i), 10, 1).ok());
+    ASSERT_TRUE(Draw(1000, 0, 0).ok());
+    EXPECT_NEAR(static_cast<double>(SeedBufferAmong(uniform_, 1000, 60)), shares[i], 1) << i;
+  }
+  buffer_options_.seed_buffer_share = {.first = 0.5, .final = 0, .decay_rows = 10};
+  MakeSeeded(60);
+  ASSERT_TRUE(Insert(1001, 10, 1).ok());
+  ASSERT_TRUE(Draw(1000, 0, 0).ok());
+  EXPECT_EQ(SeedBufferAmong(uniform_, 1000, 60), 0) << "0 at the end of a decay is none, not the sizes'";
 }
 
 TEST_F(BufferWithSeedBuffer, WithoutASettingTheShareIsThatOfTheSizes) {
   MakeSeeded(60);
   ASSERT_TRUE(Insert(1001, 20, 1).ok());
   ASSERT_TRUE(Draw(1000, 0, 0).ok());
-  EXPECT_NEAR(static_cast<double>(SeedBufferAmong(1000, 60)), 750, 70);
+  EXPECT_NEAR(static_cast<double>(SeedBufferAmong(uniform_, 1000, 60)), 750, 70);
 }
 
 TEST_F(BufferWithSeedBuffer, TheLimiterIsIdleUntilTheFirstOnlineRow) {

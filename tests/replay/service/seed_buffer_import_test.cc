@@ -330,7 +330,7 @@ TEST(ReplayServerOptionsTest, TakesTheSeedFromTheConfig) {
   EXPECT_TRUE(options.seed_buffer.evict);
   EXPECT_TRUE(options.seed_buffer.skip_bad_rows);
   EXPECT_TRUE(options.seed_buffer.others_will_come);
-  EXPECT_EQ(options.buffer.seed_buffer_share, 0.25);
+  EXPECT_EQ(options.buffer.seed_buffer_share.first, 0.25);
   EXPECT_EQ(options.seed_buffer.min_rows, 0u);
   config.mutable_learner()->set_offline_updates(100);
   EXPECT_EQ(OptionsFrom(config, kLayout).seed_buffer.min_rows, 1000u);
