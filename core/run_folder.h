@@ -1,6 +1,7 @@
 // The files of a run, by their places in its folder.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -21,6 +22,10 @@ struct RunFolder {
   std::string latest_policy() const { return absl::StrCat(root, "/policy/latest.safetensors"); }
   // The policy with the best evaluation.
   std::string best_policy() const { return absl::StrCat(root, "/policy/best.safetensors"); }
+  // The policy after `updates` updates (LearnerConfig.keep_policy_every).
+  std::string kept_policy(std::uint64_t updates) const {
+    return absl::StrCat(root, "/policy/", updates, ".safetensors");
+  }
   std::string logs() const { return absl::StrCat(root, "/logs"); }
   std::string log(absl::string_view process) const { return absl::StrCat(root, "/logs/", process, ".log"); }
   std::string replay_store() const { return absl::StrCat(root, "/replay.store"); }

@@ -86,9 +86,17 @@ absl::StatusOr<Config> LoadForLaunch(const LaunchOptions& options) {
   return config;
 }
 
+absl::Status CheckShareHasSeedBuffer(const SeedBufferConfig& seed_buffer) {
+  if (seed_buffer.share() == 0 && seed_buffer.final_share() == 0) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("replay.seed_buffer.share: expected a seed buffer with it, found ", seed_buffer.share(),
+                   " to ", seed_buffer.final_share(), " of none. Name one with --seed-buffer FILE."));
+}
+
 // Before a folder is made for a run that could not begin.
 absl::Status CheckSeedBuffer(const Config& config, const EnvSpec& env) {
   if (config.replay().seed_buffer().path().empty()) {
+    RETURN_IF_ERROR(CheckShareHasSeedBuffer(config.replay().seed_buffer()));
     if (config.learner().offline_updates() == 0) return absl::OkStatus();
     return absl::InvalidArgumentError(absl::StrCat(
         "learner.offline_updates: ", config.learner().offline_updates(),

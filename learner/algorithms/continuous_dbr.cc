@@ -98,9 +98,13 @@ void ContinuousDbr<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
     DrawDivergenceNoise(n);
     options_.use_q = networks_.uses_q();
     options_.entropy_weight = networks_.EntropyWeight();
+    if (ImitatesItself(config())) {
+      earned_ = static_cast<Scalar>(networks_.spec.config.reward_scale()) * batch.returns;
+    }
+    const VectorX<Scalar>& worth = ImitatesItself(config()) ? earned_ : regression_.behavior_value();
     policy_loss_ =
-        objective_.Compute(options_, {pi_, beta_plus_.head(), beta_minus_.head()}, batch.observations, noise_,
-                           networks_.alpha(), &networks_.critics, &d_output_);
+        objective_.Compute(options_, {pi_, beta_plus_.head(), beta_minus_.head()}, batch.observations,
+                           {batch.actions, worth}, noise_, networks_.alpha(), &networks_.critics, &d_output_);
     networks_.policy.Step(batch.observations, d_output_);
   } else {
     objective_.Evaluate({pi_, batch.observations, noise_.actions}, &networks_.critics);

@@ -42,6 +42,8 @@ namespace dbr {
 // Constraint NONE: step 3 has no second term, and step 4 moves tau alone.
 // behavior_data BATCH: in place of step 1, beta+ and beta- are fitted after step 6 to the transitions of B
 // in D+ and in D- (BatchPartition).
+// divergence ACTIONS: step 3 measures the distance of pi's mode to the actions of B itself, weighted by the
+// advantages of step 6 (the returns' with advantage SIL), in place of D(pi, beta+) and D(pi, beta-).
 // updates_per_policy_update k: steps 3 and 4 are made in every k-th update. V(s) of step 6 is then the mean
 // over draws of the same number.
 //
@@ -88,8 +90,8 @@ class ContinuousDbr : public ActorCriticAlgorithm<DualBehaviorNetworks<Scalar>> 
   GaussianDivergence<Scalar> penalty_;
   ObjectiveNoise<Scalar> noise_;
   MatrixX<Scalar> next_noise_, d_output_;  // [dimensions x target_samples * n], [2 * dimensions x n]
-  VectorX<Scalar> next_value_, value_, log_prob_, bonus_;  // [n]
-  GaussianGradient<Scalar> unused_gradient_;               // the workspace of a likelihood
+  VectorX<Scalar> next_value_, value_, log_prob_, bonus_, earned_;  // [n]
+  GaussianGradient<Scalar> unused_gradient_;                        // the workspace of a likelihood
   SelfImitation<Scalar> imitation_;
   PolicyLoss<Scalar> policy_loss_;  // of the newest update that improved the policy
 };

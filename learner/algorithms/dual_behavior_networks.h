@@ -48,8 +48,9 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
   // Whether the policy's loss of this update has its Q term: false during the warm start.
   bool uses_q() const { return this->updates >= config().warm_start_updates(); }
   // Whether this update needs beta+ and beta- at the states of B.
-  bool needs_plus() const { return improves_policy() || config().munchausen_weight() > 0; }
-  bool needs_minus() const { return improves_policy() && IsMovedByMinus(config().constraint()); }
+  bool needs_plus() const { return needs_behaviors() || config().munchausen_weight() > 0; }
+  bool needs_minus() const { return needs_behaviors() && IsMovedByMinus(config().constraint()); }
+  bool needs_behaviors() const { return improves_policy() && config().divergence() != DbrConfig::ACTIONS; }
   // Whether this update improves the policy, the multiplier and the temperature.
   bool improves_policy() const { return (this->updates + 1) % config().updates_per_policy_update() == 0; }
 

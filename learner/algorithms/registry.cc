@@ -47,9 +47,18 @@ absl::Status CheckDbr(const AlgorithmConfig& config, const std::string&) {
                    config.n_step(), ". Set one of the two to its default."));
 }
 
+absl::Status CheckDiscreteDbr(const AlgorithmConfig& config, const std::string& env) {
+  RETURN_IF_ERROR(CheckDbr(config, env));
+  if (config.dbr().divergence() != DbrConfig::ACTIONS) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("algorithm.dbr.divergence: expected one between policies for the discrete actions of "
+                   "environment '",
+                   env, "', found ACTIONS. Take KL or MMD_EXACT."));
+}
+
 constexpr Entry kAlgorithms[] = {
     {"dbr", AlgorithmConfig::kDbr, ActionKind::kDiscrete, MakeDiscreteDbr, kDbrSource, kDbrVariants,
-     CheckDbr},
+     CheckDiscreteDbr},
     {"dbr", AlgorithmConfig::kDbr, ActionKind::kContinuous, MakeContinuousDbr, kDbrSource, kDbrVariants,
      CheckDbr},
     {"bear", AlgorithmConfig::kBear, ActionKind::kDiscrete, MakeDiscreteBear, kBearSource, "divergence"},

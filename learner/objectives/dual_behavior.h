@@ -4,6 +4,7 @@
 #pragma once
 
 #include "learner/algorithm.h"
+#include "learner/objectives/action_weights.h"
 #include "proto/config.pb.h"
 
 namespace dbr {
@@ -32,8 +33,9 @@ struct PolicyLossOptions {
   bool repel_negative = false;
   double max_repulsion = 0;  // the largest D(pi, beta-) of a state that counts; 0 for no limit
   bool normalize_q = false;
-  double entropy_weight = 0;  // of the policy's entropy in nats, in units of Q
-  bool use_q = true;          // false during the warm start: neither Q nor the entropy is in the loss
+  double entropy_weight = 0;     // of the policy's entropy in nats, in units of Q
+  bool use_q = true;             // false during the warm start: neither Q nor the entropy is in the loss
+  ActionWeighting actions = {};  // with divergence ACTIONS
 
   // Whether the repulsion from beta- has a limit.
   bool limits_repulsion() const { return repel_negative && max_repulsion > 0; }
@@ -47,7 +49,8 @@ struct PolicyLossOptions {
             .max_repulsion = config.max_repulsion(),
             .normalize_q = config.normalize_q(),
             .entropy_weight = config.entropy_weight(),
-            .use_q = config.warm_start_updates() == 0};
+            .use_q = config.warm_start_updates() == 0,
+            .actions = ActionWeighting::Of(config)};
   }
   static PolicyLossOptions Of(const BearConfig& config) {
     return {.constraint = DbrConfig::FIXED,
@@ -71,12 +74,14 @@ struct ConstrainedLoss {
 
 template <class Scalar>
 struct PolicyLoss {
-  Scalar loss = 0;              // the objective with alpha as a constant
-  Scalar value = 0;             // E[min_i E_pi Q_i(s, a)]
-  Scalar divergence_plus = 0;   // mean D(pi, beta+)
-  Scalar divergence_minus = 0;  // mean D(pi, beta-); 0 unless it can move the threshold (IsMovedByMinus)
-  Scalar threshold = 0;         // c; 0 without a constraint
-  Scalar entropy = 0;           // mean, nats
+  Scalar loss = 0;             // the objective with alpha as a constant
+  Scalar value = 0;            // E[min_i E_pi Q_i(s, a)]
+  Scalar divergence_plus = 0;  // mean D(pi, beta+)
+  // Mean D(pi, beta-), or D(pi, D-) with the divergence ACTIONS, or else 0 unless it can move the threshold
+  // (IsMovedByMinus).
+  Scalar divergence_minus = 0;
+  Scalar threshold = 0;  // c; 0 without a constraint
+  Scalar entropy = 0;    // mean, nats
 };
 
 // Whether the threshold depends on D(pi, beta-). Where it does not, beta- is not evaluated at the states of

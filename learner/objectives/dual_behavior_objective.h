@@ -24,6 +24,13 @@ struct PolicyHeads {
   const GaussianHead<Scalar>& beta_minus;
 };
 
+// What the transitions of the batch did, for the divergence ACTIONS.
+template <class Scalar>
+struct TakenActions {
+  const MatrixX<Scalar>& actions;  // [dimensions x n]
+  const VectorX<Scalar>& values;   // [n] what each is worth: Q(s, a), or the return that it earned
+};
+
 // Computes the loss, with workspaces that are reused from batch to batch. One thread at a time.
 template <class Scalar>
 class DualBehaviorObjective {
@@ -34,9 +41,14 @@ class DualBehaviorObjective {
   // which c is the mean is cut at max_repulsion in each state. `d_output` [2 * dimensions x n] becomes the
   // loss's gradient with respect to the output of pi's network. beta+, beta-, alpha, the critics' weights and
   // normalize_q's scale are constants. c is a constant too, unless repel_negative is set.
+  //
+  // With the divergence ACTIONS beta+ and beta- have no part in it: D(pi, D+) and D(pi, D-) are weighted
+  // means of the distance to the actions of `taken` (action_weights.h), whose advantages are values - V(s).
+  // The weights are constants.
   PolicyLoss<Scalar> Compute(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
-                             const MatrixX<Scalar>& observations, const ObjectiveNoise<Scalar>& noise,
-                             Scalar alpha, CriticEnsemble<Scalar>* critics, MatrixX<Scalar>* d_output);
+                             const MatrixX<Scalar>& observations, const TakenActions<Scalar>& taken,
+                             const ObjectiveNoise<Scalar>& noise, Scalar alpha,
+                             CriticEnsemble<Scalar>* critics, MatrixX<Scalar>* d_output);
 
   // Evaluates the critics at draws from pi, for StateValue alone.
   void Evaluate(const PolicyDraws<Scalar>& at, CriticEnsemble<Scalar>* critics) {
@@ -50,11 +62,17 @@ class DualBehaviorObjective {
   }
 
  private:
-  void AddConstraint(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
-                     const ObjectiveNoise<Scalar>& noise, Scalar alpha, PolicyLoss<Scalar>* result);
+  // Set plus_ and, where it can move the threshold, minus_ with its limit. Report both without the limit.
+  void Measure(const PolicyLossOptions& options, const PolicyHeads<Scalar>& heads,
+               const ObjectiveNoise<Scalar>& noise, PolicyLoss<Scalar>* result);
+  void MeasureActions(const PolicyLossOptions& options, const GaussianHead<Scalar>& pi,
+                      const TakenActions<Scalar>& taken, const CriticEnsemble<Scalar>& critics,
+                      PolicyLoss<Scalar>* result);
+  void AddConstraint(const PolicyLossOptions& options, Scalar alpha, PolicyLoss<Scalar>* result);
 
   SampledQObjective<Scalar> q_objective_;
   GaussianDivergence<Scalar> plus_, minus_;
+  VectorX<Scalar> advantage_, plus_weights_, minus_weights_;  // [n] with ACTIONS
   GaussianGradient<Scalar> gradient_;
 };
 

@@ -38,6 +38,32 @@ void GaussianDivergence<Scalar>::Compute(const GaussianDivergenceOptions& option
     case DbrConfig::MMD_GAUSSIAN:
       Spread(beta, noise.beta, &beta_samples_);
       ComputeFrom(options, pi, noise.pi, beta_samples_);
+      return;
+    case DbrConfig::ACTIONS:
+      DBR_CHECK(false);  // there is no beta: ComputeToActions
+  }
+}
+
+template <class Scalar>
+void GaussianDivergence<Scalar>::ComputeToActions(const GaussianHead<Scalar>& pi,
+                                                  const MatrixX<Scalar>& actions) {
+  DBR_CHECK(actions.rows() == pi.mean().rows() && actions.cols() == pi.mean().cols());
+  gradient_.mean = pi.mean().array().tanh();  // the mode, for now
+  const Scalar each = Scalar{2} / static_cast<Scalar>(actions.rows());
+  value_ =
+      (gradient_.mean - actions).colwise().squaredNorm().transpose() / static_cast<Scalar>(actions.rows());
+  gradient_.mean = each * (gradient_.mean - actions).array() * (Scalar{1} - gradient_.mean.array().square());
+  gradient_.log_std.setZero(actions.rows(), actions.cols());
+}
+
+template <class Scalar>
+void GaussianDivergence<Scalar>::WeightBy(const VectorX<Scalar>& weights) {
+  const Scalar mean = weights.mean();
+  const Scalar scale = mean == 0 ? Scalar{0} : Scalar{1} / mean;  // a NaN goes on
+  value_.array() *= scale * weights.array();
+  for (Eigen::Index j = 0; j < weights.size(); ++j) {
+    gradient_.mean.col(j) *= scale * weights[j];
+    gradient_.log_std.col(j) *= scale * weights[j];
   }
 }
 

@@ -1,4 +1,5 @@
-// D(pi, beta) between Gaussian policies, by the divergence that the config names.
+// D(pi, beta) between Gaussian policies, or between a policy and actions, by the divergence that the config
+// names.
 #pragma once
 
 #include "nn/divergence.h"
@@ -37,6 +38,14 @@ class GaussianDivergence {
   // laid out as pi's noise. options.kind must be a sampled divergence.
   void ComputeFrom(const GaussianDivergenceOptions& options, const GaussianHead<Scalar>& pi,
                    const MatrixX<Scalar>& pi_noise, const MatrixX<Scalar>& beta_samples);
+
+  // Sets value() [n] to the mean over dimensions of (tanh(mu) - a)^2 for the actions a [dimensions x n] in
+  // [-1, 1], and gradient() likewise.
+  void ComputeToActions(const GaussianHead<Scalar>& pi, const MatrixX<Scalar>& actions);
+
+  // Multiplies value() and gradient() of each state by its weight [n] over the mean weight, so that the mean
+  // of value() becomes the weighted mean. All become 0 where every weight is 0.
+  void WeightBy(const VectorX<Scalar>& weights);
 
   // Replaces value() by min(value(), limit). The gradient of a state beyond the limit becomes 0.
   void LimitTo(Scalar limit) {

@@ -34,10 +34,21 @@ absl::Status Saver::SaveNow(const Checkpoint& checkpoint) {
   return absl::OkStatus();
 }
 
+void Saver::KeepPolicy(PolicySnapshot policy) {
+  queue_.Push(std::move(policy));
+}
+
+absl::Status Saver::Write(const Work& work) {
+  if (const auto* checkpoint = std::get_if<Checkpoint>(&work)) return SaveNow(*checkpoint);
+  const PolicySnapshot& policy = std::get<PolicySnapshot>(work);
+  absl::MutexLock lock(&writing_);
+  return SavePolicy(policy, folder_.kept_policy(policy.updates));
+}
+
 void Saver::Run() {
-  while (std::optional<Checkpoint> checkpoint = queue_.Pop()) {
-    if (const absl::Status status = SaveNow(*checkpoint); !status.ok()) {
-      spdlog::error("no checkpoint at update {}: {}", checkpoint->updates, std::string(status.message()));
+  while (const std::optional<Work> work = queue_.Pop()) {
+    if (const absl::Status status = Write(*work); !status.ok()) {
+      spdlog::error("not saved: {}", std::string(status.message()));
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 #include <thread>
+#include <variant>
 
 #include "absl/base/thread_annotations.h"
 #include "absl/status/status.h"
@@ -33,19 +34,25 @@ class Saver {
 
   // Does not block; false, and nothing is written, where the one offered before still waits its turn.
   bool Offer(Checkpoint checkpoint);
+  // Has `policy` written as policy/UPDATES.safetensors, which stays. Blocks while others wait their turn.
+  void KeepPolicy(PolicySnapshot policy);
   // Writes now, after what is under way, in the calling thread. A checkpoint older than one that is written
   // already is left out, so that one offered earlier which still waits does not take its place. Errors are
   // those of SaveTensors (core/safetensors.h).
   absl::Status SaveNow(const Checkpoint& checkpoint);
 
  private:
+  // What is to be written: a checkpoint, or a policy that is kept.
+  using Work = std::variant<Checkpoint, PolicySnapshot>;
+
   void Run();
+  absl::Status Write(const Work& work);
 
   const RunFolder folder_;
   absl::Mutex writing_;  // held while files are written, by either thread
   Checkpoints checkpoints_ ABSL_GUARDED_BY(writing_);
   std::uint64_t written_ ABSL_GUARDED_BY(writing_) = 0;  // the updates of the newest one on disk
-  BoundedQueue<Checkpoint> queue_;
+  BoundedQueue<Work> queue_;
   std::thread thread_;
 };
 

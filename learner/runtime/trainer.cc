@@ -89,8 +89,17 @@ absl::Status Trainer::Update(std::unique_ptr<DrawnBatches> drawn) {
   if (updates_ % config_.push_every() == 0) Publish();
   if (updates_ % config_.metrics_every() == 0) Record();
   if (MonotonicNow() - last_status_ >= kStatusEvery) SetStatus(/*finished=*/false);
+  if (config_.keep_policy_every() > 0 && updates_ % config_.keep_policy_every() == 0) KeepPolicy();
   MaybeCheckpoint();
   return absl::OkStatus();
+}
+
+void Trainer::KeepPolicy() {
+  PolicySnapshot kept;
+  parts_.algorithm->ExportPolicy(&kept);
+  kept.version = snapshot_.version;
+  kept.updates = updates_;
+  parts_.saver->KeepPolicy(std::move(kept));
 }
 
 void Trainer::Publish() {

@@ -70,6 +70,7 @@ class Trainer {
   bool Stopping();
   void Publish();          // offers the newest policy under the next version
   void Record();           // writes a row of metrics
+  void KeepPolicy();       // has the policy written under its number of updates
   void MaybeCheckpoint();  // offers a checkpoint where the last one is old enough
   Checkpoint MakeCheckpoint();
   void SetStatus(bool finished);

@@ -32,10 +32,27 @@ void CheckTemperature(const DbrConfig& dbr, std::vector<std::string>* errors) {
   }
 }
 
+void CheckActions(const DbrConfig& dbr, std::vector<std::string>* errors) {
+  const bool actions = dbr.divergence() == DbrConfig::ACTIONS;
+  if (actions && dbr.value_penalty()) {
+    errors->emplace_back(
+        "algorithm.dbr.value_penalty: expected false with divergence: ACTIONS, which knows no action at the "
+        "next "
+        "state, found true");
+  }
+  if (!actions && dbr.action_weights() != DbrConfig::ALL) {
+    errors->push_back(
+        absl::StrCat("algorithm.dbr.action_weights: expected divergence: ACTIONS with it, found ",
+                     DbrConfig::ActionWeights_Name(dbr.action_weights()),
+                     " and divergence: ", DbrConfig::Divergence_Name(dbr.divergence())));
+  }
+}
+
 void CheckDbr(const Config& config, std::vector<std::string>* errors) {
   const DbrConfig& dbr = config.algorithm().dbr();
   CheckMultiplier(dbr, errors);
   CheckTemperature(dbr, errors);
+  CheckActions(dbr, errors);
   // A config that was printed with all of its fields has the default here.
   if (!dbr.repel_negative() && dbr.max_repulsion() != DbrConfig::default_instance().max_repulsion()) {
     errors->push_back(absl::StrCat("algorithm.dbr.max_repulsion: expected repel_negative: true with it, ",
@@ -51,6 +68,14 @@ void CheckDbr(const Config& config, std::vector<std::string>* errors) {
         absl::StrCat("algorithm.n_step: expected 1 with a munchausen_weight above 0, which raises the reward "
                      "of a single step, found ",
                      config.algorithm().n_step()));
+  }
+}
+
+void CheckShare(const SeedBufferConfig& seed_buffer, std::vector<std::string>* errors) {
+  if (seed_buffer.final_share() > 0 && seed_buffer.share_decay_transitions() == 0) {
+    errors->push_back(absl::StrCat(
+        "replay.seed_buffer.share_decay_transitions: expected above 0 with a final_share, found 0 and ",
+        "final_share: ", seed_buffer.final_share()));
   }
 }
 
@@ -80,6 +105,12 @@ void FindContradictions(const Config& config, std::vector<std::string>* errors) 
   }
   if (algorithm.has_ddqn()) CheckDdqn(config, errors);
   if (algorithm.has_dbr()) CheckDbr(config, errors);
+  if (algorithm.has_bear() && algorithm.bear().divergence() == DbrConfig::ACTIONS) {
+    errors->emplace_back(
+        "algorithm.bear.divergence: expected one between policies, for ACTIONS is for dbr alone, found "
+        "ACTIONS");
+  }
+  CheckShare(config.replay().seed_buffer(), errors);
 }
 
 }  // namespace dbr

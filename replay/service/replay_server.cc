@@ -27,7 +27,9 @@ ReplayServerOptions OptionsFrom(const Config& config, const TransitionLayout& la
   options.buffer.cumulative_advantage = config.algorithm().dbr().advantage() == DbrConfig::ARM_CUMULATIVE;
   options.buffer.minus_margin = config.algorithm().dbr().minus_margin();
   options.buffer.seed = config.seed();
-  options.buffer.seed_buffer_share = {.first = replay.seed_buffer().share()};
+  options.buffer.seed_buffer_share = {.first = replay.seed_buffer().share(),
+                                      .final = replay.seed_buffer().final_share(),
+                                      .decay_rows = replay.seed_buffer().share_decay_transitions()};
   options.seed_buffer = SeedBufferOptionsFrom(config);
   options.server.address = replay.address();
   options.server.allow_insecure = replay.allow_insecure();

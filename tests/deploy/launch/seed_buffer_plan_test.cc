@@ -102,6 +102,11 @@ TEST_F(SeedBufferPlanTest, UpdatesOnASeedNeedOne) {
                                           HasSubstr("dbr dataset record --env hopper")));
 }
 
+TEST_F(SeedBufferPlanTest, AShareOfASeedNeedsOne) {
+  EXPECT_THAT(Refusal(Options("", {"learner.offline_updates=0", "replay.seed_buffer.share=0.5"})),
+              AllOf(HasSubstr("replay.seed_buffer.share"), HasSubstr("--seed-buffer")));
+}
+
 TEST_F(SeedBufferPlanTest, FlagsForASeedNeedOne) {
   LaunchOptions options = Options("", {"learner.offline_updates=0"});
   options.skip_bad_rows = true;

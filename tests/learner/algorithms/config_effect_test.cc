@@ -37,6 +37,7 @@ constexpr Effect kEffects[] = {
     {"dbr", "constraint", "constraint: FIXED", "first_multiplier: 50 epsilon: 1e-6 repel_negative: true"},
     {"dbr", "constraint", "constraint: NONE"},
     {"dbr", "divergence", "divergence: MMD_EXACT"},
+    {"dbr", "divergence", "divergence: ACTIONS"},
     {"dbr", "epsilon", "epsilon: 10", "constraint: FIXED multiplier_learning_rate: 0.1"},
     {"dbr", "repel_negative", "repel_negative: true", "epsilon: 1e-6"},
     {"dbr", "value_penalty", "value_penalty: true"},
@@ -66,6 +67,16 @@ constexpr Effect kEffects[] = {
     {"dbr", "updates_per_policy_update", "updates_per_policy_update: 3"},
     {"dbr", "behavior_data", "behavior_data: BATCH"},
     {"dbr", "minus_margin", "minus_margin: 0.5", "behavior_data: BATCH"},  // PARTITIONS: the replay server's
+
+    {"dbr", "minus_margin", "minus_margin: 0.2", "divergence: ACTIONS repel_negative: true epsilon: 1e-6"},
+    {"dbr", "action_weights", "action_weights: MARGIN", "divergence: ACTIONS constraint: FIXED"},
+    {"dbr", "action_weights", "action_weights: EXPONENTIAL", "divergence: ACTIONS constraint: FIXED"},
+    {"dbr", "plus_margin", "plus_margin: 0.2",
+     "divergence: ACTIONS constraint: FIXED action_weights: MARGIN"},
+    {"dbr", "advantage_temperature", "advantage_temperature: 0.3",
+     "divergence: ACTIONS constraint: FIXED action_weights: EXPONENTIAL"},
+    {"dbr", "max_action_weight", "max_action_weight: 1.1",
+     "divergence: ACTIONS constraint: FIXED action_weights: EXPONENTIAL"},
 
     {"sac", "first_temperature", "first_temperature: 0.1"},
     {"sac", "temperature_learning_rate", "temperature_learning_rate: 0.1"},

@@ -64,6 +64,21 @@ constexpr Variant kVariants[] = {
      }},
     {"Batch", "dbr",
      [](AlgorithmSpec* spec) { spec->config.mutable_dbr()->set_behavior_data(DbrConfig::BATCH); }},
+    {"Actions", "dbr",
+     [](AlgorithmSpec* spec) {
+       if (spec->actions.discrete()) return;  // it is for continuous actions
+       DbrConfig* dbr = spec->config.mutable_dbr();
+       dbr->set_divergence(DbrConfig::ACTIONS);
+       dbr->set_action_weights(DbrConfig::EXPONENTIAL);
+     }},
+    {"ActionsSil", "dbr",
+     [](AlgorithmSpec* spec) {
+       DbrConfig* dbr = spec->config.mutable_dbr();
+       dbr->set_advantage(DbrConfig::SIL);
+       if (spec->actions.discrete()) return;
+       dbr->set_divergence(DbrConfig::ACTIONS);
+       dbr->set_action_weights(DbrConfig::MARGIN);
+     }},
     {"OneAsked", "dbr",
      [](AlgorithmSpec* spec) {
        spec->config.set_critics(3);

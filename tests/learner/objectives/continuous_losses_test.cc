@@ -200,8 +200,9 @@ class ObjectiveTest : public testing::TestWithParam<Case> {
   PolicyLoss<double> Loss(const Matrix& output, Matrix* d_output) {
     GaussianHead<double> pi;
     pi.Split(output, kPolicyLogStd);
-    return objective_.Compute(options_, {pi, plus_, minus_}, observations_, noise_, kAlpha, &critics_,
-                              d_output);
+    const Matrix no_actions;
+    return objective_.Compute(options_, {pi, plus_, minus_}, observations_, {no_actions, VectorX<double>()},
+                              noise_, kAlpha, &critics_, d_output);
   }
   // Returns the loss with a constant threshold, unless repel_negative is set.
   double Objective(const Matrix& output, const PolicyLoss<double>& at) {

@@ -174,7 +174,8 @@ class ContinuousLoss : public WholeLoss {
     return head;
   }
   PolicyLoss<double> Loss(const Matrix& at, Matrix* gradient) {
-    return objective_.Compute(options_, {HeadOf(at), plus_, minus_}, observations_, noise_,
+    const Matrix none;
+    return objective_.Compute(options_, {HeadOf(at), plus_, minus_}, observations_, {none, Vector()}, noise_,
                               AlphaOf(GetParam()), &critics_, gradient);
   }
   Vector MinusAt(const Matrix& output) const {

@@ -76,6 +76,7 @@ class TrainerTest : public testing::Test {
     config.set_max_updates(max_updates);
     config.set_push_every(push_every);
     config.set_metrics_every(10);
+    config.set_keep_policy_every(keep_policy_every_);
     TrainerParts parts{.algorithm = std::move(algorithm),
                        .matrix_products = "a library, float32",
                        .policy_service = &service_,
@@ -91,6 +92,13 @@ class TrainerTest : public testing::Test {
         draws_.get(),
         PrefetcherOptions{.counts = {needs.uniform, needs.plus, needs.minus}, .layout = Layout()});
     return std::make_unique<Trainer>(config, std::move(parts));
+  }
+
+  // The policy file at `path`, which another thread writes.
+  static absl::StatusOr<PolicySnapshot> AwaitPolicy(const std::string& path) {
+    const absl::Time deadline = absl::Now() + absl::Seconds(60);
+    while (!std::filesystem::exists(path) && absl::Now() < deadline) std::this_thread::yield();
+    return LoadPolicy(path);
   }
 
   // Runs until the service says that this run has finished, and then stops.
@@ -109,6 +117,7 @@ class TrainerTest : public testing::Test {
     thread.join();
   }
 
+  std::uint64_t keep_policy_every_ = 0;
   Rng rng_{4};
   TempDir folder_;
   std::unique_ptr<ReplayServer> replay_;
@@ -205,6 +214,33 @@ TEST_F(TrainerTest, ContinuesFromItsCheckpoint) {
   const auto policy_after = LoadPolicy(RunFolder{folder_.path()}.latest_policy());
   ASSERT_TRUE(policy_before.ok() && policy_after.ok());
   EXPECT_GT(policy_after->version, policy_before->version);
+}
+
+TEST_F(TrainerTest, KeepsThePoliciesThatAreToBeKept) {
+  Insert(100);
+  keep_policy_every_ = kUpdates / 4;
+  RunToTheEnd(MakeTrainer(kUpdates).get());
+  const RunFolder folder{folder_.path()};
+  std::set<std::vector<float>> different;
+  for (std::uint64_t updates = keep_policy_every_; updates <= kUpdates; updates += keep_policy_every_) {
+    const auto policy = AwaitPolicy(folder.kept_policy(updates));
+    ASSERT_TRUE(policy.ok()) << policy.status();
+    EXPECT_EQ(policy->updates, updates);
+    different.insert(*policy->Find(kPolicyNetwork));
+  }
+  EXPECT_EQ(different.size(), 4u);
+  EXPECT_FALSE(std::filesystem::exists(folder.kept_policy(keep_policy_every_ + 1)));
+}
+
+TEST_F(TrainerTest, KeepsNoPolicyButTheNewestUnlessItIsToldTo) {
+  Insert(100);
+  RunToTheEnd(MakeTrainer(kUpdates).get());
+  int files = 0;
+  for ([[maybe_unused]] const auto& file :
+       std::filesystem::directory_iterator(RunFolder{folder_.path()}.policies())) {
+    ++files;
+  }
+  EXPECT_EQ(files, 1);
 }
 
 TEST(SaverTest, WhatComesLateDoesNotTakeThePlaceOfWhatIsNewer) {

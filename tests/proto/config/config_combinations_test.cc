@@ -46,6 +46,28 @@ TEST(ConfigCombinations, NoMoreCriticsAreAskedThanThereAre) {
   EXPECT_THAT(ErrorsOfAlgorithm("critics: 4"), ElementsAre());
 }
 
+TEST(ConfigCombinations, ActionsStandForTheBehavioursOfDbrAlone) {
+  EXPECT_THAT(ErrorsOfDbr("divergence: ACTIONS value_penalty: true"),
+              ElementsAre(HasSubstr("algorithm.dbr.value_penalty: expected false with divergence: ACTIONS")));
+  EXPECT_THAT(
+      ErrorsOfDbr("action_weights: MARGIN"),
+      ElementsAre("algorithm.dbr.action_weights: expected divergence: ACTIONS with it, found MARGIN and "
+                  "divergence: KL"));
+  EXPECT_THAT(ErrorsOfDbr("divergence: ACTIONS action_weights: MARGIN"), ElementsAre());
+  EXPECT_THAT(ErrorsOfAlgorithm("bear { divergence: ACTIONS }"),
+              ElementsAre(HasSubstr("algorithm.bear.divergence: expected one between policies")));
+}
+
+TEST(ConfigCombinations, AShareMovesOverANumberOfTransitions) {
+  const auto message = [](const std::string& settings) {
+    return ParseConfig(absl::StrCat("replay { seed_buffer { ", settings, " } }")).status().ToString();
+  };
+  EXPECT_THAT(message("share: 0.5 final_share: 0.25"),
+              HasSubstr("replay.seed_buffer.share_decay_transitions: expected above 0 with a final_share"));
+  EXPECT_EQ(message("share: 0.5 final_share: 0.25 share_decay_transitions: 10"), "OK");
+  EXPECT_EQ(message("share: 0.5 share_decay_transitions: 10"), "OK");
+}
+
 TEST(ConfigCombinations, DoubleDqnHasNoEnsemble) {
   EXPECT_THAT(
       ErrorsOfAlgorithm("ddqn {} critics: 4"),

@@ -317,6 +317,8 @@ TEST(ReplayServerOptionsTest, TakesTheSeedFromTheConfig) {
   seed_buffer->set_path("some.hdf5");
   seed_buffer->set_layout("minari");
   seed_buffer->set_share(0.25);
+  seed_buffer->set_final_share(0.125);
+  seed_buffer->set_share_decay_transitions(5000);
   seed_buffer->set_evict(true);
   seed_buffer->set_skip_bad_rows(true);
   EXPECT_EQ(OptionsFrom(config, kLayout).seed_buffer.n_step, 1);
@@ -331,6 +333,8 @@ TEST(ReplayServerOptionsTest, TakesTheSeedFromTheConfig) {
   EXPECT_TRUE(options.seed_buffer.skip_bad_rows);
   EXPECT_TRUE(options.seed_buffer.others_will_come);
   EXPECT_EQ(options.buffer.seed_buffer_share.first, 0.25);
+  EXPECT_EQ(options.buffer.seed_buffer_share.final, 0.125);
+  EXPECT_EQ(options.buffer.seed_buffer_share.decay_rows, 5000u);
   EXPECT_EQ(options.seed_buffer.min_rows, 0u);
   config.mutable_learner()->set_offline_updates(100);
   EXPECT_EQ(OptionsFrom(config, kLayout).seed_buffer.min_rows, 1000u);
