@@ -1,15 +1,19 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <memory>
+#include <numeric>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "actor/policy_fit.h"
 #include "core/monotonic_clock.h"
+#include "core/rng.h"
 #include "core/status_macros.h"
 #include "deploy/cli/command_line.h"
 #include "deploy/cli/common_options.h"
@@ -30,6 +34,7 @@ namespace dbr {
 namespace {
 
 constexpr std::int64_t kMaxSteps = 1'000'000'000;
+constexpr std::uint64_t kMaxShare = 1'000'000;
 
 struct RecordFlags {
   std::string env;
@@ -38,21 +43,57 @@ struct RecordFlags {
   std::string out;
   std::uint64_t seed = 1;
   std::string layout = "d4rl";
-  std::string policy;
+  std::vector<std::string> policies;
+  std::vector<std::uint64_t> shares;  // of the policies, as parts of their sum; empty: all the same
+  std::string acting;                 // empty: not given
   std::string run;
 };
 
+absl::Status CheckMixture(const RecordFlags& flags) {
+  if (flags.policies.size() < 2) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--policy: expected two policies or more with --quality mixture, found ",
+                     flags.policies.size(), ". A run keeps policies with learner.keep_policy_every."));
+  }
+  if (!flags.shares.empty() && flags.shares.size() != flags.policies.size()) {
+    return absl::InvalidArgumentError(absl::StrCat("--share: expected one for each of the ",
+                                                   flags.policies.size(), " policies, or none, found ",
+                                                   flags.shares.size()));
+  }
+  if (flags.steps < static_cast<std::int64_t>(flags.policies.size())) {
+    return absl::InvalidArgumentError(absl::StrCat("--steps: expected one for each of the ",
+                                                   flags.policies.size(), " policies at least, found ",
+                                                   flags.steps));
+  }
+  return absl::OkStatus();
+}
+
 absl::Status CheckFlags(const RecordFlags& flags, const EnvSpec& env) {
-  const bool mixed = flags.quality == "mixed", medium = flags.quality == "medium";
+  const bool mixed = flags.quality == "mixed", medium = flags.quality == "medium",
+             mixture = flags.quality == "mixture";
   const auto refuse = [](absl::string_view message) { return absl::InvalidArgumentError(message); };
-  if (!mixed && !medium && flags.quality != "random") {
-    return refuse(absl::StrCat("--quality: expected random, medium or mixed, found '", flags.quality, "'"));
+  if (!mixed && !medium && !mixture && flags.quality != "random") {
+    return refuse(
+        absl::StrCat("--quality: expected random, medium, mixture or mixed, found '", flags.quality, "'"));
   }
   if (!mixed && flags.steps == 0)
     return refuse(
         absl::StrCat("--steps: expected a number of steps to record with --quality ", flags.quality));
-  if (!medium && !flags.policy.empty()) {
-    return refuse(absl::StrCat("--policy: expected with --quality medium alone, found with ", flags.quality));
+  if (mixture) RETURN_IF_ERROR(CheckMixture(flags));
+  if (!medium && !mixture && !flags.policies.empty()) {
+    return refuse(absl::StrCat("--policy: expected with --quality medium or mixture alone, found with ",
+                               flags.quality));
+  }
+  if (medium && flags.policies.size() > 1) {
+    return refuse(absl::StrCat("--policy: expected one with --quality medium, found ", flags.policies.size(),
+                               ". Take --quality mixture for several."));
+  }
+  if (!mixture && !flags.shares.empty()) {
+    return refuse(absl::StrCat("--share: expected with --quality mixture alone, found with ", flags.quality));
+  }
+  if (!medium && !mixture && !flags.acting.empty()) {
+    return refuse(absl::StrCat("--acting: expected with --quality medium or mixture alone, found with ",
+                               flags.quality));
   }
   if (!mixed && !flags.run.empty()) {
     return refuse(absl::StrCat("--run: expected with --quality mixed alone, found with ", flags.quality));
@@ -73,9 +114,9 @@ std::unique_ptr<ProgressBar> MakeBar(const RecordFlags& flags, const EnvSpec& en
   return std::make_unique<ProgressBar>(stderr, state, MonotonicNow(), kProgressEvery);
 }
 
-absl::StatusOr<std::shared_ptr<const PolicyNetworks>> MediumPolicy(const RecordFlags& flags,
-                                                                   const EnvSpec& env) {
-  if (!flags.policy.empty()) return OpenNamedPolicy(flags.policy);
+using PolicyPtr = std::shared_ptr<const PolicyNetworks>;
+
+absl::StatusOr<PolicyPtr> MediumPolicy(const EnvSpec& env) {
   const absl::StatusOr<std::string> path =
       FindShippedFile(absl::StrCat("deploy/policies/", env.name, "_medium.safetensors"));
   if (path.ok()) return OpenPolicy(*path);
@@ -84,19 +125,65 @@ absl::StatusOr<std::shared_ptr<const PolicyNetworks>> MediumPolicy(const RecordF
                                           "launch deploy/configs/", env.name, "_medium.textproto"));
 }
 
-absl::Status RecordPlay(const RecordFlags& flags, const EnvSpec& env, DatasetWriter* writer,
-                        const Interrupt& interrupt) {
-  RecordOptions options;
-  options.env = env.name;
-  options.steps = flags.steps;
-  options.seed = flags.seed;
-  if (flags.quality == "medium") {
-    ASSIGN_OR_RETURN(options.policy, MediumPolicy(flags, env));
+// The named policies, each of which fits the environment.
+absl::StatusOr<std::vector<PolicyPtr>> NamedPolicies(const RecordFlags& flags, const EnvSpec& env) {
+  std::vector<PolicyPtr> policies;
+  for (const std::string& name : flags.policies) {
+    ASSIGN_OR_RETURN(policies.emplace_back(), OpenNamedPolicy(name));
+    if (const absl::Status fits = CheckPolicyFits(policies.back()->spec(), env); !fits.ok()) {
+      return absl::Status(fits.code(), absl::StrCat("--policy ", name, ": ", fits.message()));
+    }
   }
+  return policies;
+}
+
+// The recordings that make up the file, one after another: of each policy its share of the steps.
+absl::StatusOr<std::vector<RecordOptions>> Recordings(const RecordFlags& flags, const EnvSpec& env) {
+  RecordOptions all{.env = env.name, .policy = nullptr, .steps = flags.steps, .seed = flags.seed};
+  if (flags.quality == "random") return std::vector<RecordOptions>{all};
+  if (!flags.acting.empty()) {
+    ASSIGN_OR_RETURN(all.acting, ParseActingMode(flags.acting));
+  }
+  ASSIGN_OR_RETURN(std::vector<PolicyPtr> policies, NamedPolicies(flags, env));
+  if (policies.empty()) {
+    ASSIGN_OR_RETURN(policies.emplace_back(), MediumPolicy(env));
+  }
+  std::vector<std::uint64_t> shares = flags.shares;
+  shares.resize(policies.size(), 1);
+  const auto whole = static_cast<double>(std::accumulate(shares.begin(), shares.end(), std::uint64_t{0}));
+  std::vector<RecordOptions> recordings(policies.size(), all);
+  double until = 0;
+  std::int64_t given = 0;
+  for (std::size_t i = 0; i < policies.size(); ++i) {
+    until += static_cast<double>(shares[i]);
+    const auto end =
+        static_cast<std::int64_t>(std::llround(static_cast<double>(flags.steps) * until / whole));
+    recordings[i].policy = policies[i];
+    recordings[i].steps = end - given;
+    if (i > 0) recordings[i].seed = Rng(flags.seed).Fork(i)();
+    given = end;
+    if (recordings[i].steps < 1) {
+      return absl::InvalidArgumentError(absl::StrCat("--share: expected at least one of the ", flags.steps,
+                                                     " steps for each policy, found none for ",
+                                                     flags.policies[i]));
+    }
+  }
+  return recordings;
+}
+
+absl::Status RecordPlay(const RecordFlags& flags, const EnvSpec& env,
+                        const std::vector<RecordOptions>& recordings, DatasetWriter* writer,
+                        const Interrupt& interrupt) {
   const std::unique_ptr<ProgressBar> bar = MakeBar(flags, env, flags.steps);
-  const RecordSinks sinks = {.episode = [&](const EpisodeView& episode) { return writer->Append(episode); },
-                             .progress = [&](std::int64_t steps) { bar->Update(steps, MonotonicNow()); }};
-  return RecordEpisodes(options, sinks, interrupt.flag());
+  std::int64_t before = 0;
+  const RecordSinks sinks = {
+      .episode = [&](const EpisodeView& episode) { return writer->Append(episode); },
+      .progress = [&](std::int64_t steps) { bar->Update(before + steps, MonotonicNow()); }};
+  for (const RecordOptions& recording : recordings) {
+    RETURN_IF_ERROR(RecordEpisodes(recording, sinks, interrupt.flag()));
+    before += recording.steps;
+  }
+  return absl::OkStatus();
 }
 
 absl::Status RecordRun(const RecordFlags& flags, const RunStore& run, DatasetWriter* writer,
@@ -146,8 +233,9 @@ absl::Status Record(const RecordFlags& flags, const Interrupt& interrupt) {
   RETURN_IF_ERROR(CheckFlags(flags, env->spec()));
   const DatasetWriterOptions options{.layout = layout.value_or(DatasetLayout::kD4rl), .env = env->spec()};
   if (flags.run.empty()) {
+    ASSIGN_OR_RETURN(const std::vector<RecordOptions> recordings, Recordings(flags, env->spec()));
     ASSIGN_OR_RETURN(const std::unique_ptr<DatasetWriter> writer, DatasetWriter::Create(flags.out, options));
-    RETURN_IF_ERROR(RecordPlay(flags, env->spec(), writer.get(), interrupt));
+    RETURN_IF_ERROR(RecordPlay(flags, env->spec(), recordings, writer.get(), interrupt));
     return writer->Finish();
   }
   ASSIGN_OR_RETURN(const RunStore run, OpenRunOf(flags, env->spec()));
@@ -179,11 +267,12 @@ void AddDatasetRecord(CLI::App* dataset, int* exit_code) {
   CLI::App* command = dataset->add_subcommand("record", "Record a robot's steps on every core");
   command->add_option("--env", flags->env, "The robot to record")->required()->type_name(kRobotNames);
   command
-      ->add_option(
-          "--quality", flags->quality,
-          "random: uniform actions; medium: a trained policy's mean action; mixed: all that a run saw")
+      ->add_option("--quality", flags->quality,
+                   "random: uniform actions; medium: a trained policy; mixture: several, one after another; "
+                   "mixed: all that "
+                   "a run saw")
       ->required()
-      ->type_name("random|medium|mixed");
+      ->type_name("random|medium|mixture|mixed");
   command
       ->add_option("--steps", flags->steps, "Transitions to record [mixed: all that the run's store holds]")
       ->transform(WholeNumber(1, kMaxSteps))
@@ -199,14 +288,27 @@ void AddDatasetRecord(CLI::App* dataset, int* exit_code) {
       ->capture_default_str()
       ->type_name(kWrittenLayoutNames);
   command
-      ->add_option("--policy", flags->policy,
+      ->add_option("--policy", flags->policies,
                    "medium: a policy file or a run folder, of which the raw policy plays "
-                   "[deploy/policies/ENV_medium.safetensors]")
+                   "[deploy/policies/ENV_medium.safetensors]; mixture: two or more of them")
       ->type_name("FILE_OR_RUN");
+  command
+      ->add_option("--share", flags->shares,
+                   "mixture: how many parts of the steps each policy plays, in their order [1 each]")
+      ->transform(WholeNumber(1, kMaxShare))
+      ->type_name("N");
+  command
+      ->add_option("--acting", flags->acting,
+                   "medium, mixture: whether the policy samples its actions or takes its mean [mode]")
+      ->type_name("sample|mode");
   command->add_option("--run", flags->run, "mixed: the folder of the training run")->type_name("DIR");
   command->footer(
       "Examples:\n"
       "  dbr dataset record --env hopper --quality medium --steps 1000000 --out hopper_medium.hdf5\n"
+      "  dbr dataset record --env hopper --quality mixture --policy runs/hopper/policy/20000.safetensors "
+      "--share 1 "
+      "--policy runs/hopper/policy/60000.safetensors --share 3 --acting sample --steps 1000000 --out "
+      "hopper_mixture.hdf5\n"
       "  dbr dataset record --env hopper --quality mixed --run runs/hopper --out hopper_mixed.hdf5");
   command->callback([flags, exit_code] {
     const absl::StatusOr<int> result = RunRecord(*flags);

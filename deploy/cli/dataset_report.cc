@@ -1,6 +1,9 @@
 #include "deploy/cli/dataset_report.h"
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "deploy/terminal/terminal.h"
@@ -12,6 +15,37 @@ constexpr int kNameWidth = 13;
 
 std::string Line(absl::string_view name, absl::string_view value) {
   return absl::StrCat("  ", PadRight(name, kNameWidth), value, "\n");
+}
+
+// The most lines of a distribution; with few episodes there are fewer.
+constexpr int kMostBins = 10;
+constexpr int kBarWidth = 30;
+
+int BinsFor(std::size_t episodes) {
+  return std::clamp(static_cast<int>(std::sqrt(static_cast<double>(episodes))), 1, kMostBins);
+}
+
+// A line for each of equal intervals between the least and the greatest return: its lower end, how many
+// episodes lie in it, and a bar of that. Empty where all returns are the same, or none is known.
+std::string ReturnDistribution(const DatasetFacts& facts) {
+  const double width = facts.return_max - facts.return_min;
+  if (facts.returns.empty() || !(width > 0)) return "";
+  const int bins = BinsFor(facts.returns.size());
+  std::vector<std::uint64_t> counts(static_cast<std::size_t>(bins));
+  for (const float value : facts.returns) {
+    const int bin = static_cast<int>((value - facts.return_min) / width * bins);
+    ++counts[static_cast<std::size_t>(std::clamp(bin, 0, bins - 1))];
+  }
+  const double most = static_cast<double>(*std::max_element(counts.begin(), counts.end()));
+  std::string text;
+  for (int i = 0; i < bins; ++i) {
+    const auto count = counts[static_cast<std::size_t>(i)];
+    const std::string from = PadLeft(Fixed(facts.return_min + width * i / bins, 1), 9);
+    absl::StrAppend(&text, Line(i == 0 ? "returns from" : "",
+                                absl::StrCat(from, "  ", Bar(static_cast<double>(count) / most, kBarWidth),
+                                             PadLeft(WithCommas(count), 9))));
+  }
+  return text;
 }
 
 }  // namespace
@@ -27,6 +61,7 @@ std::string DatasetText(const DatasetReport& report) {
                         " ended by a terminal, ", WithCommas(facts.timeouts), " by the time limit)")),
       Line("return", absl::StrCat(Fixed(facts.return_mean, 1), " ± ", Fixed(facts.return_std, 1), " (from ",
                                   Fixed(facts.return_min, 1), " to ", Fixed(facts.return_max, 1), ")")),
+      ReturnDistribution(facts),
       Line("bad rows", facts.bad_rows == 0
                            ? "0"
                            : absl::StrCat(WithCommas(facts.bad_rows),

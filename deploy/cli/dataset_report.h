@@ -16,7 +16,8 @@ struct DatasetReport {
   DatasetFacts facts;
 };
 
-// A line for each fact, and one for each warning (replay/dataset/dataset_facts.h).
+// A line for each fact, the distribution of the returns as bars, and a line for each warning
+// (replay/dataset/dataset_facts.h).
 std::string DatasetText(const DatasetReport& report);
 
 // {layout, rows, transitions, episodes, terminals, timeouts, non_finite, bad_flags, return: {mean, std, min,

@@ -24,6 +24,8 @@ constexpr int kMinGroup = 4;
 constexpr int kMaxGroup = 32;
 constexpr int kGroupsWanted = 4;  // of the longest episodes in all, so that few steps are played for nothing
 constexpr int kGroupsAhead = 4;   // a thread, that wait to be handed on
+constexpr std::uint64_t kActingStream = std::uint64_t{1}
+                                        << 40;  // plus the group's number; episodes are fewer
 constexpr absl::Duration kProgressEvery = absl::Milliseconds(200);
 
 using Group = std::vector<EpisodeRows>;
@@ -51,6 +53,7 @@ class GroupPlayer {
   // Episodes group * size to (group + 1) * size - 1; adds to `steps` as it goes; ends early once `stopped`.
   absl::StatusOr<Group> Play(std::int64_t group, const std::atomic<bool>& stopped,
                              std::atomic<std::int64_t>* steps) {
+    rng_ = Rng(options_.seed).Fork(kActingStream + group);
     Group episodes(envs_->size());
     std::vector<bool> playing(envs_->size(), true);
     random_.clear();
@@ -76,7 +79,8 @@ class GroupPlayer {
  private:
   absl::Status ChooseActions() {
     if (options_.policy != nullptr) {
-      return runner_.Act(*options_.policy, MODE, envs_->observations(), envs_->masks(), rng_, actions_);
+      return runner_.Act(*options_.policy, options_.acting, envs_->observations(), envs_->masks(), rng_,
+                         actions_);
     }
     for (int i = 0; i < envs_->size(); ++i) {
       for (float& value : MutableColumn(actions_, i))
@@ -100,7 +104,7 @@ class GroupPlayer {
   const RecordOptions& options_;
   const std::unique_ptr<VectorEnv> envs_;
   PolicyRunner runner_;
-  Rng rng_;                  // the mean action draws nothing from it
+  Rng rng_;                  // of the group's actions by the policy
   std::vector<Rng> random_;  // [environments] of random actions
   MatrixX<float> actions_;   // [action width x environments]
 };

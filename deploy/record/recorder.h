@@ -9,13 +9,15 @@
 
 #include "absl/status/status.h"
 #include "nn/policy.h"
+#include "proto/config.pb.h"
 #include "replay/dataset/episode.h"
 
 namespace dbr {
 
 struct RecordOptions {
   std::string env;
-  std::shared_ptr<const PolicyNetworks> policy;  // acts by its mean; null: actions are uniform in [-1, 1]
+  std::shared_ptr<const PolicyNetworks> policy;  // null: actions are uniform in [-1, 1]
+  ActingMode acting = MODE;                      // how the policy acts
   std::int64_t steps = 0;                        // at least 1
   std::uint64_t seed = 1;
   int threads = 0;  // 0: one for each core
@@ -34,7 +36,8 @@ struct RecordSinks {
 // before the step that failed.
 //
 // Blocks; Cancelled soon after `cancelled` becomes true. Other errors: InvalidArgument for an unknown
-// environment, one with discrete actions, or a policy that does not fit it (CheckPolicyFits); Internal for a
+// environment, one with discrete actions, or a policy that does not fit it (CheckPolicyFits) or has not the
+// networks to act so; Internal for a
 // policy that gives values that are not finite; errors of `sinks.episode`.
 absl::Status RecordEpisodes(const RecordOptions& options, const RecordSinks& sinks,
                             const std::atomic<bool>& cancelled);

@@ -25,6 +25,7 @@ struct DatasetFacts {
   double return_std = std::numeric_limits<double>::quiet_NaN();  // of the population
   double return_min = std::numeric_limits<double>::quiet_NaN();
   double return_max = std::numeric_limits<double>::quiet_NaN();
+  std::vector<float> returns;  // these returns, by episode
 };
 
 // What the warnings are made of.

@@ -212,6 +212,7 @@ void DatasetReader::State::CountEnd(bool terminal) {
   ++(terminal ? facts.terminals : facts.timeouts);
   if (episode.spoiled) return;
   const double value = episode.episode_return;
+  facts.returns.push_back(static_cast<float>(value));
   if (returns++ == 0) facts.return_mean = facts.return_min = facts.return_max = value;
   const double from_old_mean = value - facts.return_mean;
   facts.return_mean += from_old_mean / static_cast<double>(returns);

@@ -11,10 +11,12 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "core/file_io.h"
 #include "core/run_folder.h"
 #include "envs/env.h"
 #include "envs/registry/registry.h"
+#include "replay/dataset/dataset_reader.h"
 #include "replay/store/transition_store.h"
 #include "tests/integration/dbr_process.h"
 #include "tests/support/temp_dir.h"
@@ -97,7 +99,7 @@ TEST_F(DatasetProgramTest, BadUsageIsSaidInOneLineAndLeavesNoFile) {
     more.insert(more.begin(), {"record", "--env", "hopper", "--out", out, "--quality", quality});
     return more;
   };
-  EXPECT_THAT(refused(record("good", {"--steps", "10"}), 2), HasSubstr("random, medium or mixed"));
+  EXPECT_THAT(refused(record("good", {"--steps", "10"}), 2), HasSubstr("random, medium, mixture or mixed"));
   EXPECT_THAT(refused(record("random", {}), 2), HasSubstr("--steps"));
   EXPECT_THAT(refused(record("mixed", {}), 2),
               HasSubstr("dbr launch deploy/configs/hopper_medium.textproto"));
@@ -105,6 +107,19 @@ TEST_F(DatasetProgramTest, BadUsageIsSaidInOneLineAndLeavesNoFile) {
               HasSubstr("d4rl_pybullet"));
   EXPECT_THAT(refused(record("medium", {"--steps", "10", "--policy", folder_ / "none"}), 1),
               HasSubstr("none"));
+  EXPECT_THAT(refused(record("mixture", {"--steps", "10", "--policy", "a"}), 2),
+              HasSubstr("two policies or more with --quality mixture, found 1"));
+  EXPECT_THAT(
+      refused(record("mixture", {"--steps", "10", "--policy", "a", "--policy", "b", "--share", "1"}), 2),
+      HasSubstr("--share: expected one for each of the 2 policies, or none, found 1"));
+  EXPECT_THAT(refused(record("medium", {"--steps", "10", "--policy", "a", "--policy", "b"}), 2),
+              HasSubstr("--quality mixture for several"));
+  EXPECT_THAT(refused(record("random", {"--steps", "10", "--acting", "sample"}), 2), HasSubstr("--acting"));
+  EXPECT_THAT(refused(record("random", {"--steps", "10", "--share", "1"}), 2), HasSubstr("--share"));
+  const std::string ant = absl::StrCat(DBR_SOURCE_DIR, "/deploy/policies/ant_medium.safetensors");
+  const std::string hopper = absl::StrCat(DBR_SOURCE_DIR, "/deploy/policies/hopper_medium.safetensors");
+  EXPECT_THAT(refused(record("mixture", {"--steps", "10", "--policy", hopper, "--policy", ant}), 2),
+              AllOf(HasSubstr(absl::StrCat("--policy ", ant)), HasSubstr("hopper")));
   EXPECT_THAT(refused({"record", "--env", "hoper", "--quality", "random", "--steps", "10", "--out", out}, 2),
               HasSubstr("unknown environment"));
   EXPECT_THAT(refused({"info", folder_ / "none.hdf5", "--layout", "d4rl"}, 1), HasSubstr("none.hdf5"));
@@ -127,6 +142,38 @@ TEST_F(DatasetProgramTest, CtrlCStopsARecordingAndLeavesNothing) {
   process.Signal(SIGINT);
   EXPECT_EQ(process.Wait(), 130) << process.output();
   EXPECT_EQ(FilesInFolder(), 0);
+}
+
+TEST_F(DatasetProgramTest, AMixtureHasThePoliciesSharesOfTheSteps) {
+  const std::string out = folder_ / "out.hdf5", alone = folder_ / "alone.hdf5";
+  const std::string policy = absl::StrCat(DBR_SOURCE_DIR, "/deploy/policies/hopper_medium.safetensors");
+  const auto record = [&](const std::string& file, std::vector<std::string> more) {
+    more.insert(more.begin(), {"record", "--env", "hopper", "--out", file, "--policy", policy});
+    const auto [status, output] = Dataset(std::move(more));
+    EXPECT_EQ(status, 0) << output;
+    return output;
+  };
+  EXPECT_THAT(record(out, {"--quality", "mixture", "--policy", policy, "--share", "1", "--share", "3",
+                           "--steps", "2000", "--acting", "sample"}),
+              HasSubstr("transitions  2,000"));
+  record(alone, {"--quality", "medium", "--steps", "500", "--acting", "sample"});
+  const auto rewards = [](const std::string& file) {
+    const auto reader = DatasetReader::Open(file, {.layout = DatasetLayout::kD4rl});
+    EXPECT_TRUE(reader.ok()) << reader.status();
+    TransitionChunk chunk((*reader)->transition_layout(), 4000);
+    std::vector<float> all;
+    for (int size = *(*reader)->Next(&chunk); size > 0; size = *(*reader)->Next(&chunk)) {
+      for (int i = 0; i < size; ++i) all.push_back(chunk.row(i)[chunk.layout.reward_offset()]);
+    }
+    return all;
+  };
+  const std::vector<float> mixture = rewards(out), first = rewards(alone);
+  ASSERT_EQ(first.size(), 500u);
+  ASSERT_EQ(mixture.size(), 2000u);
+  EXPECT_TRUE(std::equal(first.begin(), first.end(), mixture.begin()))
+      << "the first policy's part comes first";
+  EXPECT_FALSE(std::equal(first.begin(), first.end(), mixture.begin() + 500))
+      << "parts have seeds of their own";
 }
 
 TEST_F(DatasetProgramTest, RecordsAllThatARunSaw) {

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "absl/strings/str_cat.h"
 #include "deploy/terminal/progress_bar.h"
 #include "deploy/terminal/terminal.h"
 
@@ -40,6 +41,25 @@ TEST(DatasetReportTest, JsonHasTheNamedFieldsInOrder) {
       R"({"layout":"d4rl_pybullet","rows":12345,"transitions":12000,"episodes":30,"terminals":20,"timeouts":10,)"
       R"("non_finite":2,"bad_flags":1,"return":{"mean":1078.25,"std":3.5,"min":-1.0,"max":2000.0},)"
       R"("actions_outside":0,"warnings":[]})");
+}
+
+TEST(DatasetReportTest, DrawsTheDistributionOfTheReturns) {
+  DatasetReport report = SmallReport();
+  report.facts.return_min = 0;
+  report.facts.return_max = 40;
+  report.facts.returns = {0, 1, 2, 3, 4, 5, 6, 7, 10, 12, 14, 19.9f, 30, 31, 39, 40};  // 16: 4 lines
+  const std::string text = DatasetText(report);
+  const auto line = [](const char* name, const char* from, double share, const char* count) {
+    return absl::StrCat("  ", PadRight(name, 13), PadLeft(from, 9), "  ", Bar(share, 30), PadLeft(count, 9),
+                        "\n");
+  };
+  EXPECT_THAT(text, HasSubstr(absl::StrCat(line("returns from", "0.0", 1, "8"), line("", "10.0", 0.5, "4"),
+                                           line("", "20.0", 0, "0"), line("", "30.0", 0.5, "4"))))
+      << text;
+  report.facts.returns.assign(5000, 3);
+  report.facts.return_min = report.facts.return_max = 3;
+  EXPECT_THAT(DatasetText(report), Not(HasSubstr("returns from"))) << "one line would say nothing";
+  EXPECT_THAT(DatasetText(SmallReport()), Not(HasSubstr("returns from")));
 }
 
 TEST(DatasetReportTest, JsonWithoutEpisodesHasNoReturns) {

@@ -75,6 +75,7 @@ TEST(RecorderTest, TheNumberOfThreadsChangesNothing) {
   for (const bool with_policy : {false, true}) {
     RecordOptions options{.env = "hopper", .policy = nullptr, .steps = 3000, .seed = 3, .threads = 1};
     if (with_policy) options.policy = RandomPolicy("hopper");
+    if (with_policy) options.acting = SAMPLE;
     const absl::StatusOr<Recorded> one = Record(options);
     ASSERT_TRUE(one.ok()) << one.status();
     options.threads = 3;
@@ -86,6 +87,17 @@ TEST(RecorderTest, TheNumberOfThreadsChangesNothing) {
     ASSERT_TRUE(other.ok()) << other.status();
     EXPECT_NE(one->episodes[0].observations, other->episodes[0].observations);
   }
+}
+
+TEST(RecorderTest, APolicyThatSamplesDoesOtherThanItsMean) {
+  RecordOptions options{.env = "hopper", .policy = RandomPolicy("hopper"), .steps = 400, .seed = 3};
+  const absl::StatusOr<Recorded> mode = Record(options), again = Record(options);
+  options.acting = SAMPLE;
+  const absl::StatusOr<Recorded> sampled = Record(options);
+  ASSERT_TRUE(mode.ok() && again.ok() && sampled.ok()) << mode.status() << sampled.status();
+  ExpectSame(*mode, *again);
+  EXPECT_NE(mode->episodes[0].actions, sampled->episodes[0].actions);
+  EXPECT_NE(sampled->episodes[0].actions, sampled->episodes[1].actions);
 }
 
 TEST(RecorderTest, GivesExactlyTheStepsAskedForInWholeEpisodesButForTheLast) {

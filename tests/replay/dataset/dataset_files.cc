@@ -249,6 +249,7 @@ Reading Expected(const std::vector<TestEpisode>& episodes, float discount) {
   facts.return_std = std::sqrt(squares / count);
   facts.return_min = *std::min_element(returns.begin(), returns.end());
   facts.return_max = *std::max_element(returns.begin(), returns.end());
+  facts.returns.assign(returns.begin(), returns.end());
   return reading;
 }
 
@@ -274,6 +275,9 @@ void ExpectSame(const Reading& actual, const Reading& expected) {
   EXPECT_NEAR(actual.facts.return_std, expected.facts.return_std, 1e-9);
   EXPECT_NEAR(actual.facts.return_min, expected.facts.return_min, 1e-9);
   EXPECT_NEAR(actual.facts.return_max, expected.facts.return_max, 1e-9);
+  ASSERT_EQ(actual.facts.returns.size(), expected.facts.returns.size());
+  for (std::size_t i = 0; i < actual.facts.returns.size(); ++i)
+    EXPECT_NEAR(actual.facts.returns[i], expected.facts.returns[i], 1e-3) << i;
 }
 
 }  // namespace dbr
