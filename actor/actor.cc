@@ -41,7 +41,7 @@ WriterOptions Writing(const ActorOptions& options, const EnvSpec& env) {
   WriterOptions writing;
   writing.address = options.replay_address;
   writing.name = absl::StrCat("actor-", options.index);
-  writing.layout = TransitionLayout::Of(env, NeedsReturns(options.config.algorithm()));
+  writing.layout = TransitionLayout::Of(env, OptionalColumnsOf(options.config.algorithm()));
   writing.batch_bytes = actor.batch_bytes();
   writing.window = static_cast<int>(actor.window());
   writing.buffered_transitions =
@@ -114,7 +114,7 @@ absl::Status Actor::Act() {
   const StepLoopOptions stepping = {.mode = actor.mode(),
                                     .exploration = exploring,
                                     .discount = options_.config.algorithm().discount(),
-                                    .with_returns = NeedsReturns(options_.config.algorithm()),
+                                    .columns = OptionalColumnsOf(options_.config.algorithm()),
                                     .reward_scale = options_.config.algorithm().reward_scale(),
                                     .n_step = static_cast<int>(options_.config.algorithm().n_step())};
   // An actor that restarts in the middle of a run must not repeat its first games.

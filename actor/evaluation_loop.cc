@@ -110,8 +110,11 @@ absl::Status EvaluationLoop::RunByUpdates() {
 }
 
 absl::Status EvaluationLoop::EvaluateIfDue(const PolicyPtr& policy) {
-  const std::uint64_t iteration = policy->snapshot().updates / options_.every_updates;
-  if (last_iteration_.has_value() && iteration <= *last_iteration_) return absl::OkStatus();
+  const PolicySnapshot& snapshot = policy->snapshot();
+  const std::uint64_t iteration = snapshot.updates / options_.every_updates;
+  const bool awaited = snapshot.ends_offline_phase && snapshot.updates != last_updates_;
+  if (last_iteration_.has_value() && iteration <= *last_iteration_ && !awaited) return absl::OkStatus();
+  last_updates_ = snapshot.updates;
   return EvaluateAll(policy, Reach(iteration));
 }
 

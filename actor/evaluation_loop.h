@@ -60,7 +60,8 @@ struct EvaluationLoopPorts {
 //
 // By updates: a policy of u updates belongs to iteration u / every_updates, and the untrained one to
 // iteration 0. The loop evaluates a new policy once its iteration is later than that of the last one
-// evaluated. Training continues meanwhile. Iterations that have passed by the end of a round are skipped; the
+// evaluated. The policy that ends an offline phase is evaluated in any case: the learner waits for it. Else
+// training continues meanwhile. Iterations that have passed by the end of a round are skipped; the
 // log and the next report name them.
 //
 // Reports that find no learner are kept, at most the newest kMaxUnsent. They are sent in order when a learner
@@ -98,6 +99,7 @@ class EvaluationLoop {
   EvaluationLoopPorts ports_;
   std::shared_ptr<const PolicyNetworks> evaluated_;  // the last one evaluated; by time
   std::optional<std::uint64_t> last_iteration_;      // the last one evaluated; by updates
+  std::optional<std::uint64_t> last_updates_;        // those of the policy evaluated last; by updates
   std::uint64_t skipped_ = 0;                        // the number of iterations skipped so far
   std::deque<EvaluationReport> unsent_;
   bool said_loss_ = false;

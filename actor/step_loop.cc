@@ -3,6 +3,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/check.h"
 #include "core/status_macros.h"
 
 namespace dbr {
@@ -13,21 +14,31 @@ StepLoop::StepLoop(std::unique_ptr<VectorEnv> envs, const StepLoopOptions& optio
       options_(options),
       exploration_(envs_->spec().actions, options.exploration, envs_->size()),
       rng_(rng),
-      n_step_(std::make_unique<NStepTransitions>(TransitionLayout::Of(envs_->spec(), options.with_returns),
+      n_step_(std::make_unique<NStepTransitions>(TransitionLayout::Of(envs_->spec(), options.columns),
                                                  envs_->size(), options.n_step, std::move(sink))),
       actions_(MatrixX<float>::Zero(envs_->spec().actions.width(), envs_->size())),
       advantages_(VectorX<float>::Zero(envs_->size())),
       next_values_(VectorX<float>::Zero(envs_->size())),
+      cut_actions_(MatrixX<float>::Zero(envs_->spec().actions.width(), envs_->size())),
       episodes_(envs_->size()) {
-  if (options.with_returns) {
+  DBR_CHECK(!options.columns.returns || !options.columns.next_actions);
+  const TransitionLayout layout = TransitionLayout::Of(envs_->spec(), options.columns);
+  if (options.columns.next_actions) {
+    const auto add = [n_step = n_step_.get()](int env, const TransitionView& step,
+                                              const FirstJudgement& judgement,
+                                              const std::optional<EpisodeEnd>& end) {
+      return n_step->Add(env, step, judgement, end);
+    };
+    next_actions_.emplace(layout, envs_->size(), add);
+  }
+  if (options.columns.returns) {
     // Episodes come whole, one after another, so that they may all be steps of environment 0.
     const auto add = [n_step = n_step_.get()](const TransitionView& step, float advantage,
                                               std::uint64_t critic_version,
                                               const std::optional<EpisodeEnd>& end) {
       return n_step->Add(0, step, {advantage, critic_version}, end);
     };
-    returns_.emplace(TransitionLayout::Of(envs_->spec(), /*with_returns=*/true), envs_->size(),
-                     ReturnOptions{options.reward_scale, options.discount}, add);
+    returns_.emplace(layout, envs_->size(), ReturnOptions{options.reward_scale, options.discount}, add);
   }
   for (int i = 0; i < envs_->size(); ++i) envs_->Reset(i, rng_());
 }
@@ -37,7 +48,9 @@ absl::Status StepLoop::Step(const PolicyNetworks& policy) {
   counters_.explored += exploration_.Apply(envs_->masks(), rng_, &actions_);
   Judge(policy);
   for (int i = 0; i < envs_->size(); ++i) envs_->Step(i, actions_);
+  FindCuts();
   if (returns_.has_value()) JudgeCuts(policy);
+  if (next_actions_.has_value()) RETURN_IF_ERROR(ActAtCuts(policy));
   for (int i = 0; i < envs_->size(); ++i) RETURN_IF_ERROR(Emit(i, policy.snapshot().version));
   envs_->Advance();
   for (int i = 0; i < envs_->size(); ++i) {
@@ -56,8 +69,9 @@ void StepLoop::Judge(const PolicyNetworks& policy) {
   }
 }
 
-void StepLoop::JudgeCuts(const PolicyNetworks& policy) {
+void StepLoop::FindCuts() {
   cuts_.clear();
+  if (!returns_.has_value() && !next_actions_.has_value()) return;
   for (int i = 0; i < envs_->size(); ++i) {
     const StepResult& result = envs_->results()[i];
     if (result.done() && !result.terminated) cuts_.push_back(i);
@@ -65,9 +79,22 @@ void StepLoop::JudgeCuts(const PolicyNetworks& policy) {
   if (cuts_.empty()) return;
   cut_observations_ = envs_->next_observations()(Eigen::all, cuts_);
   cut_masks_ = envs_->next_masks()(Eigen::all, cuts_);
+}
+
+void StepLoop::JudgeCuts(const PolicyNetworks& policy) {
+  if (cuts_.empty()) return;
   cut_values_.resize(static_cast<Eigen::Index>(cuts_.size()));
   runner_.Values(policy, cut_observations_, cut_masks_, rng_, cut_values_);
   next_values_(cuts_) = cut_values_;
+}
+
+absl::Status StepLoop::ActAtCuts(const PolicyNetworks& policy) {
+  if (cuts_.empty()) return absl::OkStatus();
+  drawn_at_cuts_.resize(actions_.rows(), static_cast<Eigen::Index>(cuts_.size()));
+  RETURN_IF_ERROR(
+      runner_.Act(policy, options_.mode, cut_observations_, cut_masks_, rng_, drawn_at_cuts_));
+  cut_actions_(Eigen::all, cuts_) = drawn_at_cuts_;
+  return absl::OkStatus();
 }
 
 absl::Status StepLoop::Emit(int i, std::uint64_t critic_version) {
@@ -93,6 +120,9 @@ absl::Status StepLoop::Emit(int i, std::uint64_t critic_version) {
   }
   if (returns_.has_value()) {
     RETURN_IF_ERROR(returns_->Add(i, transition, {advantages_[i], next_values_[i], critic_version}, end));
+  } else if (next_actions_.has_value()) {
+    RETURN_IF_ERROR(next_actions_->Add(i, transition, {advantages_[i], critic_version}, end,
+                                       Column(cut_actions_, i)));
   } else {
     RETURN_IF_ERROR(n_step_->Add(i, transition, {advantages_[i], critic_version}, end));
   }

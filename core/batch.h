@@ -24,6 +24,7 @@ using VectorX = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
 //   masks, next_masks                 [actions x n]        [0 x n] for a continuous space
 //   rewards, discounts                [n]
 //   returns                           [n]                  Monte-Carlo; [0] where the layout has none
+//   next_actions                      [action width x n]   [0 x n] where the layout has none
 //
 // Plain values, thread-compatible; the caller owns a batch and refills it, so that an update allocates
 // nothing once sizes have settled.

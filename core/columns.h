@@ -22,7 +22,8 @@ namespace dbr {
   COLUMN(discount, discounts, 1, Narrow)                               \
   COLUMN(monte_carlo_return, returns, return_width, Narrow)            \
   COLUMN(next_observation, next_observations, observation_width, Wide) \
-  COLUMN(next_mask, next_masks, mask_width, Wide)
+  COLUMN(next_mask, next_masks, mask_width, Wide)                      \
+  COLUMN(next_action, next_actions, next_action_width, Wide)
 
 // One member for each column, named as the column is: its place in a row, a pointer, a vector, a matrix.
 // Plain values. Structs that hold columns and something beside them (Batch, InsertColumns) inherit from it.

@@ -99,6 +99,7 @@ class NStepAccumulator {
     transition.discount = static_cast<float>(start.discount);
     transition.next_observation = last.next_observation;
     transition.next_mask = last.next_mask;
+    transition.next_action = last.next_action;
     oldest_ = Slot(1);
     --waiting_;
     return emit(transition, start.judgement, is_last);

@@ -41,6 +41,7 @@ inline constexpr char kObservationNormalizer[] = "observation_normalizer";
 struct PolicySnapshot {
   std::uint64_t version = 0;  // counts pushes, from 1
   std::uint64_t updates = 0;  // updates of the learner behind it
+  bool ends_offline_phase = false;  // the learner waits for an evaluation of it; not in files
   PolicySpec spec;
   float support_epsilon = 0.05f;  // the eps of the acting mode SUPPORT
   // Name and parameters of each network, flat as Mlp (nn/mlp.h) lays them.

@@ -25,15 +25,23 @@ struct TransitionView {
   float discount = 0;  // 0 after a true terminal, gamma elsewhere (also where an episode is cut)
   absl::Span<const float> next_observation;
   absl::Span<const float> next_mask;
+  // What was done at the next state, or zeros after a true terminal. It counts where the layout has it.
+  absl::Span<const float> next_action;
   // R: the discounted sum of the rewards of the episode from here on, in the environment's units
   // (core/returns.h). It counts where the layout has a return, and must be finite there.
   float monte_carlo_return = kNoReturn;
 };
 
+// The columns that transitions carry only where a run's algorithm reads them.
+struct OptionalColumns {
+  bool returns = false;       // Monte-Carlo returns
+  bool next_actions = false;  // what was done at the next state
+};
+
 // Where the values of a transition lie in a row of `stride()` floats, in the order of core/columns.h:
 //
-//   | observation | action | mask | reward | discount | return | next_observation | next_mask |
-//     observation   action   mask      1         1      0 or 1      observation        mask      floats
+//   | observation | action | mask | reward | discount | return | next_observation | next_mask | next_action |
+//     observation   action   mask      1         1      0 or 1      observation        mask     0 or action
 //
 // Replay servers, writers and readers of one run have the same layout, and refuse another.
 struct TransitionLayout {
@@ -41,10 +49,13 @@ struct TransitionLayout {
   int action_width = 0;  // 1 for a discrete action
   int mask_width = 0;    // number of discrete actions; 0 for a continuous space
   int return_width = 0;  // 1 where transitions carry their Monte-Carlo return, else 0
+  int next_action_width = 0;  // action_width where transitions carry their next action, else 0
 
-  // `with_returns`: as NeedsReturns (proto/config/config_file.h) says of the run's config.
-  static TransitionLayout Of(const EnvSpec& spec, bool with_returns = false) {
-    return {spec.observation_size, spec.actions.width(), spec.actions.mask_width(), with_returns ? 1 : 0};
+  // `optional`: as OptionalColumnsOf (proto/config/config_file.h) says of the run's config.
+  static TransitionLayout Of(const EnvSpec& spec, const OptionalColumns& optional = {}) {
+    const int action = spec.actions.width();
+    return {spec.observation_size, action, spec.actions.mask_width(), optional.returns ? 1 : 0,
+            optional.next_actions ? action : 0};
   }
 
   ColumnSet<ColumnPlace> columns() const {
@@ -82,6 +93,9 @@ struct TransitionLayout {
   }
   int next_mask_offset() const {
     return columns().next_masks.offset;
+  }
+  int next_action_offset() const {
+    return columns().next_actions.offset;
   }
 
   bool operator==(const TransitionLayout&) const = default;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,14 @@ struct UpdateMetric {
   double value = 0;
 };
 
+// Values that a phase of the run sets from outside, in place of those that an algorithm learns or has in its
+// config. Those that are not set have no effect.
+struct UpdateControls {
+  std::optional<double> multiplier;      // of the constraint
+  std::optional<double> temperature;     // of the entropy
+  std::optional<double> target_entropy;  // that the temperature aims at, in nats for each dimension
+};
+
 // What an algorithm is made from. `seed` is the random seed of its parameters and its noise.
 struct AlgorithmSpec {
   std::string env;
@@ -65,6 +74,10 @@ class Algorithm {
   // quantity, where a loss or a parameter is no longer finite. The state is then worthless and training must
   // stop.
   virtual absl::Status Update(const UpdateBatches& batches) = 0;
+
+  // Sets what holds in the updates from now on. An algorithm that has no such value takes no notice of it
+  // (config_combinations.cc refuses a config that asks for it).
+  virtual void SetControls(const UpdateControls&) {}
 
   // The advantage of each transition in the newest update's uniform batch [n].
   virtual absl::Span<const float> advantages() const = 0;

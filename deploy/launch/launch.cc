@@ -271,6 +271,10 @@ absl::Status Launch::Train() {
 
 void Launch::Observe(const RunSample& sample, absl::Time now) {
   watch_.Observe(sample, supervisor_->restarts(), now);
+  if (sample.learner.has_value() && !sample.learner->finetuning().empty() &&
+      !std::exchange(said_finetuning_, true)) {
+    Say(sample.learner->finetuning());
+  }
   if (sample.replay.has_value()) {
     line_.Update({.sample = sample,
                   .left = watch_.TimeLeft(sample),

@@ -76,7 +76,8 @@ class Launch {
   const std::shared_ptr<spdlog::logger> log_;
   ProgressLine line_;
   RunWatch watch_;
-  bool acting_ = false;  // the actors were started
+  bool acting_ = false;           // the actors were started
+  bool said_finetuning_ = false;  // how the run goes on from its offline phase
   std::unique_ptr<Supervisor> supervisor_;
   std::unique_ptr<RunMonitor> monitor_;
 };

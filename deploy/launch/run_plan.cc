@@ -111,7 +111,7 @@ absl::Status CheckSeedBuffer(const Config& config, const EnvSpec& env) {
   absl::Status fits;
   {
     const ShutdownWatcher watcher([&stopped] { stopped = true; });
-    fits = CheckSeedBufferFits(options, TransitionLayout::Of(env, NeedsReturns(config.algorithm())),
+    fits = CheckSeedBufferFits(options, TransitionLayout::Of(env, OptionalColumnsOf(config.algorithm())),
                                config.replay().capacity());
   }
   return fits.ok() && stopped ? absl::CancelledError("stopped by a signal") : fits;

@@ -108,7 +108,7 @@ absl::StatusOr<RunStore> OpenRunStore(const std::string& run) {
       opened.store,
       TransitionStore::Open({.path = folder.replay_store(),
                              .env = env->spec().name,
-                             .layout = TransitionLayout::Of(env->spec(), NeedsReturns(config.algorithm())),
+                             .layout = TransitionLayout::Of(env->spec(), OptionalColumnsOf(config.algorithm())),
                              .capacity = config.replay().capacity(),
                              .byte_budget = config.replay().byte_budget(),
                              .resume = true}));

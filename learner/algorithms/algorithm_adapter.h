@@ -18,6 +18,9 @@ class AlgorithmAdapter final : public Algorithm {
     const FlushDenormals flush;
     return core_.Update(batches.uniform, batches.plus, batches.minus);
   }
+  void SetControls(const UpdateControls& controls) override {
+    if constexpr (requires { core_.SetControls(controls); }) core_.SetControls(controls);
+  }
   absl::Span<const float> advantages() const override { return core_.advantages(); }
   absl::Span<const UpdateMetric> metrics() const override { return core_.metrics(); }
   double UpdateFlops() const override { return core_.UpdateFlops(); }

@@ -22,8 +22,8 @@ absl::Status ContinuousDbr<Scalar>::Update(const BasicBatch<Scalar>& uniform, co
                                              &networks_.critics, RewardBonus(uniform));
   ImprovePolicy(uniform);
   JudgeAndImitate(uniform);
-  networks_.Finish(policy_loss_,
-                   static_cast<Scalar>(config().target_entropy() * networks_.spec.actions.size));
+  const double target_entropy = networks_.controls.target_entropy.value_or(config().target_entropy());
+  networks_.Finish(policy_loss_, static_cast<Scalar>(target_entropy * networks_.spec.actions.size));
   return networks_.Report({critic_loss, beta_plus_.loss(), beta_minus_.loss()}, policy_loss_,
                           regression_.target().mean(), &metrics_);
 }

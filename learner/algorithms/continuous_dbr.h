@@ -44,6 +44,7 @@ namespace dbr {
 // in D+ and in D- (BatchPartition).
 // divergence ACTIONS: step 3 measures the distance of pi's mode to the actions of B itself, weighted by the
 // advantages of step 6 (the returns' with advantage SIL), in place of D(pi, beta+) and D(pi, beta-).
+// SetControls: alpha and tau are then the given ones and not learned, and target_entropy is the given one.
 // updates_per_policy_update k: steps 3 and 4 are made in every k-th update. V(s) of step 6 is then the mean
 // over draws of the same number.
 //

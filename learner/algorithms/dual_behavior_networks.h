@@ -41,10 +41,12 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
   BatchNeeds needs() const { return DualBehaviorNeeds(this->spec.config); }
 
   // The multiplier of the divergence. It is 0 where there is no constraint.
-  Scalar alpha() const { return constrained ? multiplier.value() : Scalar{0}; }
+  Scalar alpha() const {
+    return constrained ? Given(controls.multiplier, multiplier.value()) : Scalar{0};
+  }
 
   // The weight of the policy's entropy in the values: the temperature, or 0 where there is none.
-  Scalar tau() const { return soft ? temperature.value() : Scalar{0}; }
+  Scalar tau() const { return soft ? Given(controls.temperature, temperature.value()) : Scalar{0}; }
   // Whether the policy's loss of this update has its Q term: false during the warm start.
   bool uses_q() const { return this->updates >= config().warm_start_updates(); }
   // Whether this update needs beta+ and beta- at the states of B.
@@ -78,12 +80,13 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
         });
   }
 
-  // Ends an update. Where it improved the policy, the multiplier and the temperature make a step. During the
+  // Ends an update. Where it improved the policy, the multiplier and the temperature make a step, unless they
+  // are given from outside. During the
   // warm start both stand still, for nothing there answers to them. target_entropy is in nats.
   void Finish(const PolicyLoss<Scalar>& loss, Scalar target_entropy) {
     if (improves_policy() && uses_q()) {
-      if (constrained) multiplier.Step(loss.divergence_plus - loss.threshold);
-      if (soft) temperature.Step(target_entropy - loss.entropy);
+      if (constrained && !controls.multiplier) multiplier.Step(loss.divergence_plus - loss.threshold);
+      if (soft && !controls.temperature) temperature.Step(target_entropy - loss.entropy);
     }
     ++this->updates;
   }
@@ -156,12 +159,16 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
   Multiplier<Scalar> multiplier;
   Multiplier<Scalar> temperature;    // not used unless `soft`
   BatchPartition<Scalar> partition;  // of the newest B, with behavior_data BATCH
+  UpdateControls controls;           // of the run's phase
   const bool constrained;
   const bool soft;  // whether the policy's entropy has a temperature
 
  private:
   static constexpr char kTemperature[] = "log_temperature";
 
+  static Scalar Given(const std::optional<double>& value, Scalar learned) {
+    return value.has_value() ? static_cast<Scalar>(*value) : learned;
+  }
   // A logarithm must exist where there is no temperature too.
   static double FirstTemperature(const DbrConfig& config) {
     return config.first_temperature() > 0 ? config.first_temperature() : 1;

@@ -42,6 +42,7 @@ class MirroredAlgorithm final : public Algorithm {
     Mirror(batches.minus, &minus_);
     return inner_->Update({uniform_, plus_, minus_});
   }
+  void SetControls(const UpdateControls& controls) override { inner_->SetControls(controls); }
   absl::Span<const float> advantages() const override { return inner_->advantages(); }
   absl::Span<const UpdateMetric> metrics() const override { return inner_->metrics(); }
   double UpdateFlops() const override { return inner_->UpdateFlops(); }
@@ -78,6 +79,7 @@ class MirroredAlgorithm final : public Algorithm {
       mirrored->actions(0, j) = static_cast<float>(symmetry_.action[action]);
     } else {
       Place(symmetry_.action, batch.actions, j, &mirrored->actions);
+      Place(symmetry_.action, batch.next_actions, j, &mirrored->next_actions);
     }
   }
 

@@ -79,6 +79,7 @@ class NormalizedAlgorithm final : public Algorithm {
     Normalize(batches.minus, &minus_);
     return inner_->Update({uniform_, plus_, minus_});
   }
+  void SetControls(const UpdateControls& controls) override { inner_->SetControls(controls); }
   absl::Span<const float> advantages() const override { return inner_->advantages(); }
   absl::Span<const UpdateMetric> metrics() const override { return inner_->metrics(); }
   double UpdateFlops() const override { return inner_->UpdateFlops(); }

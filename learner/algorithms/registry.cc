@@ -8,12 +8,14 @@
 #include "core/status_macros.h"
 #include "learner/algorithms/awac.h"
 #include "learner/algorithms/brac.h"
+#include "learner/algorithms/cal_ql.h"
 #include "learner/algorithms/continuous_bear.h"
 #include "learner/algorithms/continuous_dbr.h"
 #include "learner/algorithms/ddqn.h"
 #include "learner/algorithms/discrete_bear.h"
 #include "learner/algorithms/discrete_dbr.h"
 #include "learner/algorithms/discrete_sac.h"
+#include "learner/algorithms/iql.h"
 #include "learner/algorithms/mirrored.h"
 #include "learner/algorithms/normalized.h"
 #include "learner/algorithms/sac.h"
@@ -72,6 +74,11 @@ constexpr Entry kAlgorithms[] = {
      "variant, adaptive_multiplier"},
     {"td3", AlgorithmConfig::kTd3, ActionKind::kContinuous, MakeTd3, "Fujimoto, van Hoof, Meger 2018", ""},
     {"awac", AlgorithmConfig::kAwac, ActionKind::kContinuous, MakeAwac, "Nair et al. 2020", ""},
+    {"td3_bc", AlgorithmConfig::kTd3Bc, ActionKind::kContinuous, MakeTd3, "Fujimoto, Gu 2021", ""},
+    {"rebrac", AlgorithmConfig::kRebrac, ActionKind::kContinuous, MakeTd3, "Tarasov et al. 2023", ""},
+    {"iql", AlgorithmConfig::kIql, ActionKind::kContinuous, MakeIql, "Kostrikov, Nair, Levine 2021", ""},
+    {"cal_ql", AlgorithmConfig::kCalQl, ActionKind::kContinuous, MakeCalQl, "Nakamoto et al. 2023",
+     "calibrated"},
 };
 
 const char* NameOf(ActionKind kind) {

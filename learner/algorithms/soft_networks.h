@@ -4,7 +4,9 @@
 
 #include <vector>
 
+#include "absl/container/inlined_vector.h"
 #include "absl/status/status.h"
+#include "absl/types/span.h"
 #include "learner/objectives/soft_policy_loss.h"
 #include "learner/training/actor_critic.h"
 #include "learner/training/multiplier.h"
@@ -15,7 +17,7 @@ namespace dbr {
 // SAC's networks. The algorithm owns them. One thread at a time.
 template <class Scalar>
 struct SoftNetworks : ActorCritic<Scalar> {
-  // `config` is the spec's SacConfig or DiscreteSacConfig.
+  // `config` is the spec's SacConfig, DiscreteSacConfig or CalQlConfig.
   template <class TemperatureConfig>
   SoftNetworks(const AlgorithmSpec& spec, const TemperatureConfig& config)
       : ActorCritic<Scalar>(spec),
@@ -42,13 +44,15 @@ struct SoftNetworks : ActorCritic<Scalar> {
             {"train/advantage_mean"}, {"train/advantage_positive"}, {"train/advantage_std"}};
   }
 
-  // Sets `metrics`. Returns Internal where a value is not finite.
+  // Sets `metrics`: Metrics(), and behind them an algorithm's own. Returns Internal where a value is not finite.
   absl::Status Report(Scalar critic_loss, const SoftPolicyLoss<Scalar>& loss, Scalar target_mean,
-                      std::vector<UpdateMetric>* metrics) const {
+                      std::vector<UpdateMetric>* metrics, absl::Span<const double> own = {}) const {
     const AdvantageFigures figures = FiguresOf(this->advantages);
-    return SetMetrics({critic_loss, loss.loss, temperature.value(), loss.entropy, loss.value, target_mean,
-                       figures.mean, figures.positive, figures.deviation},
-                      this->updates, metrics);
+    absl::InlinedVector<double, 16> values = {critic_loss,  loss.loss,   temperature.value(), loss.entropy,
+                                              loss.value,   target_mean, figures.mean,        figures.positive,
+                                              figures.deviation};
+    values.insert(values.end(), own.begin(), own.end());
+    return SetMetrics(values, this->updates, metrics);
   }
 
   void Save(TensorFile* file) const {

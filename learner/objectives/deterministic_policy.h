@@ -1,7 +1,10 @@
 // TD3's deterministic policy: how it is represented, its smoothed target actions, and its loss with the
-// gradient.
+// gradient, alone or with a pull to the data's actions.
 #pragma once
 
+#include <algorithm>
+
+#include "core/batch.h"
 #include "learner/objectives/continuous_losses.h"
 #include "learner/objectives/sampled_actions.h"
 #include "learner/training/critic_ensemble.h"
@@ -38,37 +41,62 @@ void SmoothedActions(const MatrixX<Scalar>& mean, const MatrixX<Scalar>& noise,
                  .matrix();
 }
 
+// The terms of the policy's loss. The defaults are TD3's.
+struct DeterministicPolicyTerms {
+  bool normalize_q = false;  // whether Q is divided by the mean of |Q| over the batch
+  double q_weight = 1;
+  double penalty = 0;  // the weight of the squared distance to the data's action
+};
+
 // Computes the loss, with workspaces that are reused from batch to batch. One thread at a time.
 template <class Scalar>
 class DeterministicPolicyObjective {
  public:
-  // Returns -E[Q_1(s, tanh(mean(s)))] (Fujimoto et al. 2018, algorithm 1; Silver et al. 2014). Both critics
-  // are evaluated: value1() and value2() of `critics` are then their values at the policy's actions.
-  Scalar Evaluate(const GaussianHead<Scalar>& pi, const MatrixX<Scalar>& observations,
-                  CriticEnsemble<Scalar>* critics) {
+  // Returns -w E[Q_1(s, tanh(mean(s)))] / scale + penalty * E[|tanh(mean(s)) - a|^2], w = q_weight (Fujimoto et
+  // al. 2018, algorithm 1; with the data's actions a: Fujimoto, Gu 2021, equation 3; Tarasov et al. 2023,
+  // equation 3). The scale is the mean of |Q_1| with normalize_q, else 1, and a constant. Both twins are
+  // evaluated: value1() and value2() of `critics` are then their values at the policy's actions.
+  Scalar Evaluate(const DeterministicPolicyTerms& terms, const GaussianHead<Scalar>& pi,
+                  const BasicBatch<Scalar>& batch, CriticEnsemble<Scalar>* critics) {
+    terms_ = terms;
     noise_.setZero(pi.mean().rows(), pi.mean().cols());
     draws_.DrawActions(pi, noise_);
-    critics->Evaluate(draws_.CriticInput(observations));
-    return -critics->value1().mean();
+    critics->Evaluate(draws_.CriticInput(batch.observations));
+    q_scale_ = static_cast<Scalar>(terms.q_weight);
+    if (terms.normalize_q) q_scale_ /= std::max(critics->value1().cwiseAbs().mean(), kLeastMeanQ);
+    difference_ = draws_.sample().action - batch.actions;
+    distance_ = difference_.squaredNorm() / static_cast<Scalar>(batch.size());
+    return -q_scale_ * critics->value1().mean() + static_cast<Scalar>(terms.penalty) * distance_;
   }
+
+  // The mean of |tanh(mean(s)) - a|^2, the sum over the dimensions of the action, in the newest Evaluate.
+  Scalar distance() const { return distance_; }
 
   // Sets `d_output` [2 * dimensions x n] to the gradient of the newest Evaluate with respect to the output of
   // the policy's network. It is 0 for the log-stds. The critic's weights are constants.
   void Gradient(const GaussianHead<Scalar>& pi, CriticEnsemble<Scalar>* critics, MatrixX<Scalar>* d_output) {
     const Eigen::Index n = pi.mean().cols();
-    d_q_.setConstant(1, n, Scalar{-1} / static_cast<Scalar>(n));
+    d_q_.setConstant(1, n, -q_scale_ / static_cast<Scalar>(n));
     d_log_prob_.setZero(n);
     gradient_.mean.setZero(pi.mean().rows(), n);
     gradient_.log_std.setZero(pi.mean().rows(), n);
-    draws_.Backprop(critics->FirstInputGradient(d_q_, pi.mean().rows()), d_log_prob_, &gradient_);
+    d_action_ = critics->FirstInputGradient(d_q_, pi.mean().rows());
+    d_action_ += 2 * static_cast<Scalar>(terms_.penalty) / static_cast<Scalar>(n) * difference_;
+    draws_.Backprop(d_action_, d_log_prob_, &gradient_);
     pi.Join(gradient_, d_output);
   }
 
  private:
+  // A mean of |Q| below this, as in an untrained critic, would make the step of Q too large.
+  static constexpr Scalar kLeastMeanQ = Scalar{1e-3};
+
   SampledActions<Scalar> draws_;
+  DeterministicPolicyTerms terms_;
+  Scalar q_scale_ = 1, distance_ = 0;
   VectorX<Scalar> d_log_prob_;  // [n]
   GaussianGradient<Scalar> gradient_;
-  MatrixX<Scalar> noise_, d_q_;  // [dimensions x n], [1 x n]
+  // noise_, difference_ and d_action_ [dimensions x n], d_q_ [1 x n].
+  MatrixX<Scalar> noise_, difference_, d_action_, d_q_;
 };
 
 }  // namespace dbr

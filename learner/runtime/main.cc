@@ -19,6 +19,7 @@
 #include "envs/registry/registry.h"
 #include "learner/algorithms/registry.h"
 #include "learner/runtime/checkpoints.h"
+#include "learner/runtime/finetune.h"
 #include "learner/runtime/policy_service.h"
 #include "learner/runtime/rollout_reporter.h"
 #include "learner/runtime/trainer.h"
@@ -78,17 +79,19 @@ absl::Status Resume(const RunFolder& folder, const LearnerConfig& config, Traine
 }
 
 // Labels that the replay has may be newer than what `trainer` goes on from, and it refuses older ones: no
-// training before it has told of them. Blocks until then, or until a signal has stopped the trainer.
-absl::Status ContinueVersions(ReplayClient* replay, Trainer* trainer) {
+// training before it has told of them. It also tells what the seed buffer's episodes returned. Blocks until then,
+// or until a signal has stopped the trainer.
+absl::Status AskReplay(ReplayClient* replay, Trainer* trainer, Finetune* finetune) {
   StopFlag stopping;
   const ShutdownWatcher watcher([&] {
     stopping.Set();
     trainer->Stop();
   });
-  const absl::StatusOr<StatsReply> stats = AwaitStats(replay, "to hear of its newest labels", stopping);
+  const absl::StatusOr<StatsReply> stats = AwaitStats(replay, "to hear of its newest labels and its seed buffer", stopping);
   if (stopping.IsSet()) return absl::OkStatus();
   RETURN_IF_ERROR(stats.status());
   trainer->StartVersionsAfter(stats->newest_critic_version());
+  if (stats->seed_buffer_episodes() > 0) finetune->set_seed_buffer_return(stats->seed_buffer_return_mean());
   return absl::OkStatus();
 }
 
@@ -105,8 +108,9 @@ void WriteEvaluation(const EvaluationReport& report, MetricsSink* metrics) {
 
 std::unique_ptr<Prefetcher> MakePrefetcher(const Config& config, const AlgorithmSpec& spec,
                                            const BatchNeeds& needs, ReplayClient* draws) {
-  const TransitionLayout layout{spec.observation_size, spec.actions.width(), spec.actions.mask_width(),
-                                NeedsReturns(config.algorithm()) ? 1 : 0};
+  const TransitionLayout layout =
+      TransitionLayout::Of({.name = spec.env, .observation_size = spec.observation_size, .actions = spec.actions},
+                           OptionalColumnsOf(config.algorithm()));
   return std::make_unique<Prefetcher>(
       draws, PrefetcherOptions{.counts = {needs.uniform, needs.plus, needs.minus},
                                .layout = layout,
@@ -120,7 +124,11 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
   ASSIGN_OR_RETURN(std::unique_ptr<Algorithm> algorithm, MakeAlgorithm(spec));
   ASSIGN_OR_RETURN(const std::unique_ptr<MetricsSink> metrics,
                    MetricsSink::Open(arguments.folder, kMetricsFlush, absl::Now()));
-  PolicyService service([&](const EvaluationReport& report) { WriteEvaluation(report, metrics.get()); });
+  Finetune finetune(config);
+  PolicyService service([&](const EvaluationReport& report) {
+    WriteEvaluation(report, metrics.get());
+    finetune.Observe(report);
+  });
   Saver saver(arguments.folder, static_cast<int>(learner.keep_checkpoints()));
   ReplayClient draws(arguments.replay_address), labels(arguments.replay_address),
       stats(arguments.replay_address);
@@ -131,11 +139,12 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
                      .metrics = metrics.get(),
                      .saver = &saver,
                      .prefetcher = MakePrefetcher(config, spec, needs, &draws),
-                     .relabeller = std::make_unique<Relabeller>(&labels)};
+                     .relabeller = std::make_unique<Relabeller>(&labels),
+                     .finetune = &finetune,};
   Trainer trainer(learner, std::move(parts));
   if (arguments.resume) RETURN_IF_ERROR(Resume(arguments.folder, learner, &trainer));
   RETURN_IF_ERROR(metrics->StartSession(static_cast<std::int64_t>(trainer.updates()), absl::Now()));
-  RETURN_IF_ERROR(ContinueVersions(&stats, &trainer));
+  RETURN_IF_ERROR(AskReplay(&stats, &trainer, &finetune));
   ASSIGN_OR_RETURN(
       const RunningServer running,
       StartServer({arguments.address, arguments.allow_insecure || learner.allow_insecure()}, {&service}));

@@ -39,10 +39,21 @@ absl::StatusOr<std::unique_ptr<DrawnBatches>> Prefetcher::Next() {
     ++asked_;
     if (waits) ++waited_;
   }
-  std::optional<std::unique_ptr<DrawnBatches>> batches = ready_.Pop();
-  if (batches.has_value()) return *std::move(batches);
+  while (std::optional<Drawn> drawn = ready_.Pop()) {
+    {
+      absl::MutexLock lock(&mutex_);
+      if (drawn->terms_set == terms_set_) return std::move(drawn->batches);
+    }
+    Recycle(std::move(drawn->batches));
+  }
   absl::MutexLock lock(&mutex_);
   return final_.ok() ? absl::CancelledError("the prefetcher is closed") : final_;
+}
+
+void Prefetcher::SetTerms(const DrawTerms& terms) {
+  absl::MutexLock lock(&mutex_);
+  terms_ = terms;
+  ++terms_set_;
 }
 
 void Prefetcher::Recycle(std::unique_ptr<DrawnBatches> batches) {
@@ -60,14 +71,21 @@ void Prefetcher::Run() {
   for (;;) {
     if (batches == nullptr)
       batches = free_.Pop(absl::ZeroDuration()).value_or(std::make_unique<DrawnBatches>());
+    DrawTerms terms;
+    std::uint64_t terms_set = 0;
+    {
+      absl::MutexLock lock(&mutex_);
+      terms = terms_;
+      terms_set = terms_set_;
+    }
     const absl::Status status =
-        client_->Sample(options_.counts, options_.layout, options_.call_timeout, batches.get());
+        client_->Sample(options_.counts, options_.layout, options_.call_timeout, batches.get(), terms);
     if (!status.ok()) {
       if (!HandleFailure(status, &away)) break;
       continue;
     }
     if (std::exchange(away, false)) spdlog::info("the replay server gives batches again");
-    if (!ready_.Push(std::move(batches))) break;
+    if (!ready_.Push({std::move(batches), terms_set})) break;
   }
   ready_.Close();
 }

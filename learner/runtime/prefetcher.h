@@ -1,6 +1,7 @@
 // Batches drawn ahead of the updates.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <thread>
 
@@ -33,6 +34,8 @@ class Prefetcher {
 
   // The next batch; blocks until there is one. Cancelled after Close, or the final error.
   absl::StatusOr<std::unique_ptr<DrawnBatches>> Next();
+  // Sets what later draws ask of the server. Batches that were drawn before it are dropped.
+  void SetTerms(const DrawTerms& terms);
   // Gives a batch back, so that its memory is used again.
   void Recycle(std::unique_ptr<DrawnBatches> batches);
   // The share of Next() calls so far that had to wait, in [0, 1].
@@ -41,6 +44,12 @@ class Prefetcher {
   void Close();  // from any thread; wakes Next
 
  private:
+  // A batch, and how often the terms had been set when it was asked for.
+  struct Drawn {
+    std::unique_ptr<DrawnBatches> batches;
+    std::uint64_t terms_set = 0;
+  };
+
   void Run();
   // Whether to go on after a failed call; waits before the next attempt.
   bool HandleFailure(const absl::Status& status, bool* away);
@@ -48,11 +57,13 @@ class Prefetcher {
 
   ReplayClient* const client_;
   const PrefetcherOptions options_;
-  BoundedQueue<std::unique_ptr<DrawnBatches>> ready_;
+  BoundedQueue<Drawn> ready_;
   BoundedQueue<std::unique_ptr<DrawnBatches>> free_;
   mutable absl::Mutex mutex_;
   bool closed_ ABSL_GUARDED_BY(mutex_) = false;
   absl::Status final_ ABSL_GUARDED_BY(mutex_);
+  DrawTerms terms_ ABSL_GUARDED_BY(mutex_);
+  std::uint64_t terms_set_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t asked_ ABSL_GUARDED_BY(mutex_) = 0;
   std::uint64_t waited_ ABSL_GUARDED_BY(mutex_) = 0;
   std::thread thread_;

@@ -24,6 +24,7 @@ Trainer::Trainer(const LearnerConfig& config, TrainerParts parts)
 
 absl::Status Trainer::Load(const TensorFile& file) {
   RETURN_IF_ERROR(parts_.algorithm->Load(file));
+  RETURN_IF_ERROR(parts_.finetune->Load(file));
   RETURN_IF_ERROR(GetCounter(kUpdates, file, &updates_));
   return GetCounter(kVersion, file, &snapshot_.version);
 }
@@ -32,6 +33,7 @@ absl::Status Trainer::Run() {
   last_record_ = last_checkpoint_ = MonotonicNow();
   updates_at_record_ = updates_;
   const std::uint64_t updates_before = updates_;
+  parts_.prefetcher->SetTerms(parts_.finetune->terms());
   Publish();
   const End end = UpdateToTheEnd();
   if (!end.state_is_sound) return end.status;                          // the checkpoints before it stay
@@ -53,6 +55,7 @@ void Trainer::Stop() {
     absl::MutexLock lock(&mutex_);
     stopping_ = true;
   }
+  parts_.finetune->Close();
   parts_.prefetcher->Close();
 }
 
@@ -73,6 +76,7 @@ absl::Status Trainer::Save() {
 
 Trainer::End Trainer::UpdateToTheEnd() {
   while (config_.max_updates() == 0 || updates_ < config_.max_updates()) {
+    if (parts_.finetune->IsBetweenPhases(updates_) && !PassBetweenPhases()) return {.status = absl::OkStatus()};
     absl::StatusOr<std::unique_ptr<DrawnBatches>> drawn = parts_.prefetcher->Next();
     if (!drawn.ok()) return {.status = Stopping() ? absl::OkStatus() : drawn.status()};
     const absl::Status updated = Update(*std::move(drawn));
@@ -81,7 +85,23 @@ Trainer::End Trainer::UpdateToTheEnd() {
   return {.status = absl::OkStatus(), .finished = true};
 }
 
+bool Trainer::PassBetweenPhases() {
+  spdlog::info("the offline phase is over after {} updates: waiting for an evaluation of its policy", updates_);
+  snapshot_.ends_offline_phase = true;
+  Publish();
+  snapshot_.ends_offline_phase = false;
+  parts_.saver->Offer(MakeCheckpoint());
+  const std::optional<double> offline_return = parts_.finetune->AwaitOfflineReturn(updates_);
+  if (!offline_return.has_value()) return false;
+  parts_.finetune->Decide(updates_, *offline_return);
+  parts_.prefetcher->SetTerms(parts_.finetune->terms());
+  spdlog::info("{}", parts_.finetune->Text());
+  SetStatus(/*finished=*/false);
+  return true;
+}
+
 absl::Status Trainer::Update(std::unique_ptr<DrawnBatches> drawn) {
+  parts_.algorithm->SetControls(parts_.finetune->ControlsAt(updates_));
   RETURN_IF_ERROR(parts_.algorithm->Update({drawn->uniform, drawn->plus, drawn->minus}));
   parts_.relabeller->Offer(snapshot_.version, drawn->uniform.keys, parts_.algorithm->advantages());
   parts_.prefetcher->Recycle(std::move(drawn));
@@ -120,6 +140,7 @@ void Trainer::SetStatus(bool finished) {
   status.set_updates_per_second(seconds > 1 ? since_record / seconds : updates_per_second_);
   status.set_finished(finished);
   status.set_matrix_products(parts_.matrix_products);
+  status.set_finetuning(parts_.finetune->Text());
   for (const UpdateMetric& metric : parts_.algorithm->metrics()) {
     Metric* entry = status.add_metrics();
     entry->set_name(metric.name);
@@ -140,6 +161,8 @@ void Trainer::Record() {
                      {"learner/labels_dropped", static_cast<double>(parts_.relabeller->dropped())}};
   for (const UpdateMetric& metric : parts_.algorithm->metrics())
     scalars.emplace_back(metric.name, metric.value);
+  const Scalars of_finetuning = parts_.finetune->Metrics();
+  scalars.insert(scalars.end(), of_finetuning.begin(), of_finetuning.end());
   if (const absl::Status status =
           parts_.metrics->Write(static_cast<std::int64_t>(updates_), absl::Now(), scalars);
       !status.ok()) {
@@ -158,6 +181,7 @@ Checkpoint Trainer::MakeCheckpoint() {
   Checkpoint checkpoint;
   checkpoint.updates = updates_;
   parts_.algorithm->Save(&checkpoint.state);
+  parts_.finetune->Save(&checkpoint.state);
   PutCounter(kUpdates, updates_, &checkpoint.state);
   PutCounter(kVersion, snapshot_.version, &checkpoint.state);
   parts_.algorithm->ExportPolicy(&checkpoint.policy);

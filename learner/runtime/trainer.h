@@ -13,6 +13,7 @@
 #include "core/run_folder.h"
 #include "learner/algorithm.h"
 #include "learner/metrics/metrics_sink.h"
+#include "learner/runtime/finetune.h"
 #include "learner/runtime/prefetcher.h"
 #include "learner/runtime/relabeller.h"
 #include "learner/runtime/saver.h"
@@ -22,7 +23,7 @@ namespace dbr {
 
 class PolicyService;
 
-// What a trainer works with. The three pointers are not owned and outlive the trainer.
+// What a trainer works with. The four pointers are not owned and outlive the trainer.
 struct TrainerParts {
   std::unique_ptr<Algorithm> algorithm;
   std::string matrix_products;  // what makes them, for people (nn/product/product_library.h)
@@ -31,6 +32,7 @@ struct TrainerParts {
   Saver* saver = nullptr;
   std::unique_ptr<Prefetcher> prefetcher;
   std::unique_ptr<Relabeller> relabeller;
+  Finetune* finetune = nullptr;
 };
 
 // Load, StartVersionsAfter and Run are for one thread, in this order; Stop may be called from any.
@@ -64,6 +66,8 @@ class Trainer {
     bool state_is_sound = true;  // false: an update failed
   };
   End UpdateToTheEnd();
+  // Publishes the offline policy, waits for its evaluation and decides how the run goes on. False after Stop.
+  bool PassBetweenPhases();
   // Makes one update and what is due after it. Errors are those of Algorithm::Update.
   absl::Status Update(std::unique_ptr<DrawnBatches> drawn);
   absl::Status Save();

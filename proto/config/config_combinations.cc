@@ -1,6 +1,7 @@
 #include "proto/config/config_combinations.h"
 
 #include "absl/strings/str_cat.h"
+#include "proto/config/config_file.h"
 
 namespace dbr {
 namespace {
@@ -79,6 +80,70 @@ void CheckShare(const SeedBufferConfig& seed_buffer, std::vector<std::string>* e
   }
 }
 
+bool IsGiven(const ScheduleConfig& schedule) {
+  return schedule.updates() > 0 || schedule.first() != 0 || schedule.last() != 0;
+}
+
+// `positive`: whether the values are above 0, as those that move geometrically.
+void CheckSchedule(const Config& config, const char* name, const ScheduleConfig& schedule, bool positive,
+                   std::vector<std::string>* errors) {
+  if (!IsGiven(schedule)) return;
+  const std::string field = absl::StrCat("finetune.", name);
+  if (schedule.updates() == 0) {
+    errors->push_back(absl::StrCat(field, ".updates: expected above 0 with first and last, found 0: the ",
+                                   "schedule would end before it begins"));
+  }
+  if (positive && (schedule.first() <= 0 || schedule.last() <= 0)) {
+    errors->push_back(absl::StrCat(field, ": expected first and last above 0, found ", schedule.first(), " and ",
+                                   schedule.last()));
+  }
+  if (!config.algorithm().has_dbr()) {
+    errors->push_back(absl::StrCat(field, ": expected algorithm dbr with it, which alone has schedules"));
+    return;
+  }
+  const DbrConfig& dbr = config.algorithm().dbr();
+  const bool of_multiplier = &schedule == &config.finetune().multiplier();
+  if (of_multiplier && dbr.constraint() == DbrConfig::NONE) {
+    errors->push_back(absl::StrCat(field, ": expected a constraint other than NONE with it, found NONE"));
+  }
+  if (!of_multiplier && dbr.first_temperature() == 0) {
+    errors->push_back(
+        absl::StrCat(field, ": expected algorithm.dbr.first_temperature above 0 with it, found 0"));
+  }
+}
+
+void CheckFinetune(const Config& config, std::vector<std::string>* errors) {
+  const FinetuneConfig& finetune = config.finetune();
+  if (finetune.mode() == FinetuneConfig::NONE) {
+    if (IsGiven(finetune.multiplier()) || IsGiven(finetune.temperature()) ||
+        IsGiven(finetune.target_entropy())) {
+      errors->emplace_back("finetune.mode: expected RETAIN, WARM_START or AUTO with a schedule, found NONE");
+    }
+    return;
+  }
+  const LearnerConfig& learner = config.learner();
+  if (learner.offline_updates() == 0 || TrainsOfflineAlone(config)) {
+    errors->push_back(absl::StrCat("finetune.mode: expected NONE, or learner.offline_updates above 0 and ",
+                                   "learner.max_updates beyond them, found ",
+                                   FinetuneConfig::Mode_Name(finetune.mode()), " with ",
+                                   learner.offline_updates(), " and ", learner.max_updates()));
+  }
+  const SeedBufferConfig& seed_buffer = config.replay().seed_buffer();
+  if (seed_buffer.share() > 0 || seed_buffer.share_decay_transitions() > 0) {
+    errors->push_back(absl::StrCat("replay.seed_buffer.share: expected 0 and no decay with finetune.mode: ",
+                                   FinetuneConfig::Mode_Name(finetune.mode()),
+                                   ", which sets the share, found ", seed_buffer.share(), " and ",
+                                   seed_buffer.share_decay_transitions(), " transitions"));
+  }
+  CheckSchedule(config, "multiplier", finetune.multiplier(), /*positive=*/true, errors);
+  CheckSchedule(config, "temperature", finetune.temperature(), /*positive=*/true, errors);
+  CheckSchedule(config, "target_entropy", finetune.target_entropy(), /*positive=*/false, errors);
+  if (IsGiven(finetune.temperature()) && IsGiven(finetune.target_entropy())) {
+    errors->emplace_back(
+        "finetune.target_entropy: expected none with finetune.temperature, which is then not learned, found both");
+  }
+}
+
 // Double DQN has one network, which is its policy and its critic.
 void CheckDdqn(const Config& config, std::vector<std::string>* errors) {
   const AlgorithmConfig &algorithm = config.algorithm(), &defaults = AlgorithmConfig::default_instance();
@@ -111,6 +176,7 @@ void FindContradictions(const Config& config, std::vector<std::string>* errors) 
         "ACTIONS");
   }
   CheckShare(config.replay().seed_buffer(), errors);
+  CheckFinetune(config, errors);
 }
 
 }  // namespace dbr

@@ -116,8 +116,9 @@ bool TrainsOfflineAlone(const Config& config) {
   return learner.max_updates() > 0 && learner.max_updates() <= learner.offline_updates();
 }
 
-bool NeedsReturns(const AlgorithmConfig& config) {
-  return config.dbr().advantage() == DbrConfig::SIL;
+OptionalColumns OptionalColumnsOf(const AlgorithmConfig& config) {
+  return {.returns = config.dbr().advantage() == DbrConfig::SIL || config.has_cal_ql(),
+          .next_actions = config.has_rebrac() && config.rebrac().critic_penalty() > 0};
 }
 
 std::vector<int> HiddenSizes(const Config& config) {

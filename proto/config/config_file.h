@@ -7,6 +7,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/strings/string_view.h"
+#include "core/transition.h"
 #include "proto/config.pb.h"
 
 namespace dbr {
@@ -29,9 +30,9 @@ std::string PrintConfig(const Config& config);
 // Whether all updates are made on the seed buffer, so that no actor ever acts.
 bool TrainsOfflineAlone(const Config& config);
 
-// Whether transitions carry their Monte-Carlo returns (TransitionLayout::Of). DBR's advantage SIL needs them
-// for R - V(s).
-bool NeedsReturns(const AlgorithmConfig& config);
+// Which columns the algorithm reads beside those that all need: Monte-Carlo returns (dbr's advantage SIL for
+// R - V(s); cal_ql as the floor of Q) and next actions (rebrac with a critic_penalty).
+OptionalColumns OptionalColumnsOf(const AlgorithmConfig& config);
 
 // Returns the config's hidden_sizes, or the paper's 256, 256, 256 where it has none.
 std::vector<int> HiddenSizes(const Config& config);

@@ -30,7 +30,8 @@ TransitionLayout LayoutOf(const TransitionBatch& batch) {
   return {.observation_width = static_cast<int>(batch.observation_width()),
           .action_width = static_cast<int>(batch.action_width()),
           .mask_width = static_cast<int>(batch.mask_width()),
-          .return_width = static_cast<int>(batch.return_width())};
+          .return_width = static_cast<int>(batch.return_width()),
+          .next_action_width = static_cast<int>(batch.next_action_width())};
 }
 
 void Append(absl::Span<const float> values, int, Column* column) {
@@ -54,6 +55,7 @@ void SetLayout(const TransitionLayout& layout, TransitionBatch* batch) {
   batch->set_action_width(layout.action_width);
   batch->set_mask_width(layout.mask_width);
   batch->set_return_width(layout.return_width);
+  batch->set_next_action_width(layout.next_action_width);
 }
 
 absl::Status CheckShape(const TransitionBatch& batch, const TransitionLayout& layout) {
@@ -61,6 +63,7 @@ absl::Status CheckShape(const TransitionBatch& batch, const TransitionLayout& la
   RETURN_IF_ERROR(CheckWidth("action_width", layout.action_width, batch.action_width()));
   RETURN_IF_ERROR(CheckWidth("mask_width", layout.mask_width, batch.mask_width()));
   RETURN_IF_ERROR(CheckWidth("return_width", layout.return_width, batch.return_width()));
+  RETURN_IF_ERROR(CheckWidth("next_action_width", layout.next_action_width, batch.next_action_width()));
   constexpr std::uint32_t kMaxRows = 1u << 24;
   if (batch.count() > kMaxRows) {
     return absl::InvalidArgumentError(
@@ -111,6 +114,7 @@ PolicyMessage Encode(const PolicySnapshot& snapshot) {
   message.set_action_size(snapshot.spec.actions.size);
   for (const int size : snapshot.spec.hidden_sizes) message.add_hidden_sizes(size);
   message.set_critic_layer_norm(snapshot.spec.critic_layer_norm);
+  message.set_ends_offline_phase(snapshot.ends_offline_phase);
   for (const auto& [name, parameters] : snapshot.networks) {
     NamedNetwork* network = message.add_networks();
     network->set_name(name);
@@ -140,6 +144,7 @@ absl::StatusOr<PolicySnapshot> Decode(const PolicyMessage& message) {
   PolicySnapshot snapshot;
   snapshot.version = message.version();
   snapshot.updates = message.updates();
+  snapshot.ends_offline_phase = message.ends_offline_phase();
   snapshot.spec.env = message.env();
   snapshot.spec.algorithm = message.algorithm();
   snapshot.spec.observation_size = static_cast<int>(message.observation_size());

@@ -45,6 +45,8 @@ class Admission {
   absl::Status AwaitDraw(absl::Mutex* mutex, const DrawRequest& request, absl::Time deadline)
       ABSL_EXCLUSIVE_LOCKS_REQUIRED(mutex);
 
+  // To be called before a draw waits (RateLimiter::CountFrom).
+  void CountFrom(std::uint64_t first) { limiter_.CountFrom(first); }
   // To be called before a draw of `draws` rows waits (RateLimiter::MakeRoomFor). Returns the tolerance where
   // it had to be raised, else 0.
   double MakeRoomFor(std::uint64_t draws);

@@ -150,13 +150,14 @@ absl::Status PartitionedBuffer::Draw(const DrawRequest& request, const DrawBuffe
     return absl::InvalidArgumentError("sample: expected at least one transition to draw, found 0");
   RETURN_IF_ERROR(CheckCount("sample: transitions to draw", asked, kMaxDraws));
   absl::MutexLock lock(&mutex_);
+  admission_.CountFrom(request.first_transitions);
   result->raised_tolerance = admission_.MakeRoomFor(asked);
   RETURN_IF_ERROR(admission_.AwaitDraw(&mutex_, request, deadline));
   const Partitions& partitions = rows_.partitions();
   std::uint64_t drawn = 0;
   for (int part = 0; part < kDrawnParts; ++part) {
     result->drawn[part] = partitions.size(part) > 0 ? request.counts[part] : 0;
-    drawer_.Draw(part, result->drawn[part], out[part]);
+    drawer_.Draw(part, result->drawn[part], request.seed_buffer_share, out[part]);
     drawn += result->drawn[part];
   }
   store_->counters().sampled += drawn;

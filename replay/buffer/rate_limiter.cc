@@ -29,7 +29,7 @@ absl::StatusOr<RateLimiter> RateLimiter::Make(const RateLimiterOptions& options,
 }
 
 std::uint64_t RateLimiter::Minimum(const Counts& counts) const {
-  return options_.min_size - std::min(options_.min_size, counts.seed_buffer);
+  return std::max(options_.min_size - std::min(options_.min_size, counts.seed_buffer), first_);
 }
 
 double RateLimiter::Lead(const Counts& counts) const {
@@ -43,7 +43,7 @@ bool RateLimiter::CanInsert(const Counts& counts) const {
 }
 
 bool RateLimiter::CanDraw(const Counts& counts, std::uint64_t n) const {
-  if (counts.size < options_.min_size) return false;
+  if (counts.size < options_.min_size || counts.inserted < first_) return false;
   if (options_.samples_per_insert == 0 || Offline(counts)) return true;
   return static_cast<double>(n) - Lead(counts) <= options_.tolerance;
 }
@@ -69,6 +69,11 @@ std::string RateLimiter::WhyInsertWaits(const Counts& counts) const {
 }
 
 std::string RateLimiter::WhyDrawWaits(const Counts& counts, std::uint64_t n) const {
+  if (counts.inserted < first_) {
+    return absl::StrCat(Describe(counts), ": draws wait for the first ", first_,
+                        " transitions beside the seed buffer; ", first_ - counts.inserted,
+                        " more are needed");
+  }
   if (counts.size < options_.min_size) {
     return absl::StrCat(Describe(counts), ": draws wait for min_size; ", options_.min_size - counts.size,
                         " more transitions are needed");

@@ -1,6 +1,7 @@
 // The rate limiter: how many transitions may be drawn for each one that is inserted.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 
@@ -22,7 +23,8 @@ struct RateLimiterOptions {
 // on.
 //
 // The rows of the seed buffer count as neither inserted nor sampled: `minimum` is min_size less their number,
-// at least 0. While there are no others, draws are free and are not counted.
+// at least 0. While there are no others, draws are free and are not counted. CountFrom raises `minimum`, and no
+// draw is made before it.
 //
 // Plain arithmetic without clock or lock. Thread-compatible: the buffer's mutex guards it.
 class RateLimiter {
@@ -44,6 +46,9 @@ class RateLimiter {
   // To be called before a draw of n waits. True where the tolerance was raised for it, to n / 2.
   bool MakeRoomFor(std::uint64_t n);
 
+  // Counts from `first` inserted rows on, where that is more than before: a phase of which nothing is drawn.
+  void CountFrom(std::uint64_t first) { first_ = std::max(first_, first); }
+
   // Sentences for people and errors: the limiter's bounds, its counters, and which bound holds the call.
   std::string WhyInsertWaits(const Counts& counts) const;
   std::string WhyDrawWaits(const Counts& counts, std::uint64_t n) const;
@@ -53,12 +58,15 @@ class RateLimiter {
  private:
   explicit RateLimiter(const RateLimiterOptions& options) : options_(options) {}
 
-  bool Offline(const Counts& counts) const { return counts.seed_buffer > 0 && counts.inserted == 0; }
+  bool Offline(const Counts& counts) const {
+    return counts.seed_buffer > 0 && counts.inserted == 0 && first_ == 0;
+  }
   std::uint64_t Minimum(const Counts& counts) const;
   double Lead(const Counts& counts) const;
   std::string Describe(const Counts& counts) const;
 
   RateLimiterOptions options_;
+  std::uint64_t first_ = 0;  // inserted rows before any draw
 };
 
 }  // namespace dbr

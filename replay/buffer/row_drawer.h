@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/rng.h"
@@ -22,12 +23,13 @@ class RowDrawer {
             const Partitions* partitions);
 
   // Writes `count` rows of `part` (Part), and their keys, to the first `count` places of each column of
-  // `out`. Requires that the part is not empty, or a count of 0. O(count).
-  void Draw(int part, std::uint32_t count, const DrawColumns& out);
+  // `out`. `share`: of the seed buffer, in place of that of the constructor. Requires that the part is not
+  // empty, or a count of 0. O(count).
+  void Draw(int part, std::uint32_t count, std::optional<double> share, const DrawColumns& out);
 
  private:
   // Fills slots_.
-  void ChooseSlots(int part, std::uint32_t count);
+  void ChooseSlots(int part, std::uint32_t count, std::optional<double> share);
 
   const SeedBufferShare share_;
   const TransitionStore& store_;

@@ -95,12 +95,14 @@ class ReplayClient::Impl {
 ReplayClient::ReplayClient(const std::string& address) : impl_(std::make_shared<Impl>(address)) {}
 
 absl::Status ReplayClient::Sample(const DrawCounts& counts, const TransitionLayout& layout,
-                                  absl::Duration timeout, DrawnBatches* out) {
+                                  absl::Duration timeout, DrawnBatches* out, const DrawTerms& terms) {
   SampleRequest request;
   request.set_uniform(static_cast<std::uint32_t>(counts.uniform));
   request.set_plus(static_cast<std::uint32_t>(counts.plus));
   request.set_minus(static_cast<std::uint32_t>(counts.minus));
   request.set_allow_empty_partitions(true);
+  if (terms.seed_buffer_share.has_value()) request.set_seed_buffer_share(*terms.seed_buffer_share);
+  request.set_first_transitions(terms.first_transitions);
   if (timeout != absl::InfiniteDuration()) request.set_wait_s(absl::ToDoubleSeconds(timeout));
   std::unique_ptr<SampleReply> reply = impl_->TakeReply();
   RETURN_IF_ERROR(impl_->Run(timeout + kAnswerTime, [&](grpc::ClientContext* context) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,12 @@ struct DrawCounts {
   int uniform = 0;  // from D, all transitions
   int plus = 0;     // from D+
   int minus = 0;    // from D-
+};
+
+// What a draw asks of the server beside the counts.
+struct DrawTerms {
+  std::optional<double> seed_buffer_share;  // in place of the server's; 0 draws none where there are others
+  std::uint64_t first_transitions = 0;      // waits until so many beside the seed buffer have come in
 };
 
 // The result of one Sample call. The caller owns it and has it refilled.
@@ -47,7 +54,7 @@ class ReplayClient {
   // message); InvalidArgument where the server's transitions are not of `layout`, naming the width, and where
   // the counts are 0 or ask for more than one message holds.
   absl::Status Sample(const DrawCounts& counts, const TransitionLayout& layout, absl::Duration timeout,
-                      DrawnBatches* out);
+                      DrawnBatches* out, const DrawTerms& terms = {});
   // Writes `advantages` [one for each key] of the critic `critic_version` to the transitions; the reply
   // counts what was taken. InvalidArgument where the lengths differ.
   absl::StatusOr<RelabelReply> Relabel(std::uint64_t critic_version, absl::Span<const std::uint64_t> keys,

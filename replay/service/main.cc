@@ -28,7 +28,7 @@ namespace {
 absl::StatusOr<ReplayServerOptions> MakeOptions(const ServiceArguments& arguments, const Config& config) {
   ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv(TrainingEnv(config.env())));
   ReplayServerOptions options =
-      OptionsFrom(config, TransitionLayout::Of(env->spec(), NeedsReturns(config.algorithm())));
+      OptionsFrom(config, TransitionLayout::Of(env->spec(), OptionalColumnsOf(config.algorithm())));
   options.store.env = env->spec().name;
   options.store.path = arguments.folder.replay_store();
   options.store.resume = arguments.resume;

@@ -10,6 +10,7 @@
 #include "core/status_macros.h"
 #include "replay/dataset/dataset_reader.h"
 #include "replay/dataset/n_step_rows.h"
+#include "replay/dataset/next_action_reader.h"
 #include "replay/dataset/return_reader.h"
 
 namespace dbr {
@@ -51,9 +52,8 @@ absl::StatusOr<std::unique_ptr<DatasetReader>> OpenFitting(const SeedBufferOptio
   }
   if (layout.return_width > 0 && options.discount >= 1) {
     return absl::InvalidArgumentError(absl::StrCat(
-        "algorithm.discount: expected below 1 where the returns of a seed buffer are needed (advantage "
-        "SIL), for those of "
-        "episodes that were cut have no bound else, found ",
+        "algorithm.discount: expected below 1 where the returns of a seed buffer are needed (dbr's "
+        "advantage SIL, cal_ql), for those of episodes that were cut have no bound else, found ",
         options.discount));
   }
   DatasetOptions dataset{.env = options.env,
@@ -82,8 +82,8 @@ SeedBufferRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
           .actions_outside = static_cast<std::uint64_t>(facts.actions_outside)};
 }
 
-// The file's rows [n x stride], as the buffer lays them: with returns where it wants them, and of up to
-// options.n_step steps.
+// The file's rows [n x stride], as the buffer lays them: with returns or next actions where it wants them, and
+// of up to options.n_step steps.
 class SeedBufferRows {
  public:
   // `reader` outlives this.
@@ -92,6 +92,8 @@ class SeedBufferRows {
     if (options.n_step > 1) n_step_.emplace(layout, options.n_step);
     if (layout.return_width > 0) {
       returns_.emplace(reader, options.discount);
+    } else if (layout.next_action_width > 0) {
+      next_actions_.emplace(reader);
     } else {
       chunk_.emplace(layout, PartitionedBuffer::kSeedBufferRowsPerLock);
     }
@@ -115,17 +117,22 @@ class SeedBufferRows {
   // The next rows of one step each.
   absl::StatusOr<absl::Span<const float>> NextSteps() {
     if (returns_.has_value()) return returns_->Next();
+    if (next_actions_.has_value()) return next_actions_->Next();
     RETURN_IF_ERROR(reader_->Next(&*chunk_).status());
     return chunk_->rows();
   }
 
   // Whether row i of the newest NextSteps() does not follow the row before it.
-  bool Starts(std::size_t i) const { return returns_.has_value() ? i == 0 : chunk_->starts[i] != 0; }
+  bool Starts(std::size_t i) const {
+    if (returns_.has_value()) return i == 0;
+    return next_actions_.has_value() ? next_actions_->Starts(i) : chunk_->starts[i] != 0;
+  }
 
   DatasetReader* const reader_;
   const std::size_t stride_;  // floats
   std::optional<ReturnReader> returns_;
-  std::optional<TransitionChunk> chunk_;  // without returns
+  std::optional<NextActionReader> next_actions_;
+  std::optional<TransitionChunk> chunk_;  // without either
   std::optional<NStepRows> n_step_;       // where n_step > 1
 };
 
@@ -156,6 +163,12 @@ absl::StatusOr<SeedBufferRecord> ImportSeedBuffer(const SeedBufferOptions& optio
   }
   // Bad rows may have been left out.
   RETURN_IF_ERROR(CheckEnough(options, static_cast<std::uint64_t>(reader->facts().transitions)));
+  if (buffer->Stats().seed_buffer_rows == 0) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "replay.seed_buffer.path: expected transitions that are followed by another one or end in a true ",
+        "terminal, for algorithm.rebrac.critic_penalty needs the next action, found none in ", options.path,
+        ". Set critic_penalty: 0 or take another file."));
+  }
   RETURN_IF_ERROR(
       buffer->CompleteSeedBuffer(RecordOf(reader->facts(), MonotonicNow() - start), !options.evict));
   return buffer->Stats().seed_buffer_record;

@@ -135,8 +135,18 @@ absl::StatusOr<DrawRequest> DecodeSample(const SampleRequest& request, const Tra
                                                    " transitions of ", row_bytes,
                                                    " bytes in one call, found ", asked));
   }
-  return DrawRequest{.counts = {request.uniform(), request.plus(), request.minus()},
-                     .allow_empty_partitions = request.allow_empty_partitions()};
+  DrawRequest draw{.counts = {request.uniform(), request.plus(), request.minus()},
+                   .allow_empty_partitions = request.allow_empty_partitions(),
+                   .first_transitions = request.first_transitions()};
+  if (request.has_seed_buffer_share()) {
+    const double share = request.seed_buffer_share();
+    if (!(share >= 0 && share <= 1)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("sample: seed_buffer_share: expected 0 to 1, found ", share));
+    }
+    draw.seed_buffer_share = share;
+  }
+  return draw;
 }
 
 DrawBuffers MakeRoom(const DrawRequest& request, const TransitionLayout& layout, SampleReply* reply) {

@@ -31,7 +31,8 @@ struct Header {
   std::uint64_t capacity;
   std::uint64_t total_bytes;
   char env[64];
-  std::int32_t return_width;
+  std::int16_t return_width;
+  std::int16_t next_action_width;
   std::uint32_t crc32c;  // of all before it
 };
 static_assert(sizeof(Header) <= StoreFile::kHeaderBytes);
@@ -47,7 +48,8 @@ Header MakeHeader(const StoreShape& shape) {
   header.observation_width = shape.layout.observation_width;
   header.action_width = shape.layout.action_width;
   header.mask_width = shape.layout.mask_width;
-  header.return_width = shape.layout.return_width;
+  header.return_width = static_cast<std::int16_t>(shape.layout.return_width);
+  header.next_action_width = static_cast<std::int16_t>(shape.layout.next_action_width);
   header.capacity = shape.capacity;
   header.total_bytes = shape.total_bytes;
   std::memcpy(header.env, shape.env.data(), shape.env.size());
@@ -59,7 +61,9 @@ std::string Describe(const Header& header) {
   return absl::StrCat("environment '", absl::string_view(header.env, strnlen(header.env, sizeof header.env)),
                       "', widths ", header.observation_width, "/", header.action_width, "/",
                       header.mask_width, " (observation/action/mask), ",
-                      header.return_width > 0 ? "with" : "without", " returns, capacity ", header.capacity);
+                      header.return_width > 0 ? "with" : "without", " returns, ",
+                      header.next_action_width > 0 ? "with" : "without", " next actions, capacity ",
+                      header.capacity);
 }
 
 absl::Status CheckHeader(const std::string& path, const Header& expected, const Header& found,
@@ -80,7 +84,8 @@ absl::Status CheckHeader(const std::string& path, const Header& expected, const 
   }
   if (std::memcmp(&expected, &found, offsetof(Header, total_bytes)) != 0 ||
       std::memcmp(expected.env, found.env, sizeof found.env) != 0 ||
-      expected.return_width != found.return_width) {
+      expected.return_width != found.return_width ||
+      expected.next_action_width != found.next_action_width) {
     return absl::FailedPreconditionError(absl::StrCat(
         "replay store ", path, " was made for another set-up: expected ", Describe(expected), "; found ",
         Describe(found), ". Resume with the run's own config, or start in a new folder."));

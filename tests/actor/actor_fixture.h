@@ -60,7 +60,7 @@ class ActorTest : public ::testing::Test {
 
   std::unique_ptr<ReplayServer> StartReplay(const EnvSpec& env, bool resume = false) const {
     ReplayServerOptions options =
-        OptionsFrom(config_, TransitionLayout::Of(env, NeedsReturns(config_.algorithm())));
+        OptionsFrom(config_, TransitionLayout::Of(env, OptionalColumnsOf(config_.algorithm())));
     options.store.path = folder_.path() + "/replay.store";
     options.store.env = env.name;
     options.store.resume = resume;

@@ -21,7 +21,7 @@ TEST_F(ActorTest, TransitionsArriveWithTheirReturnsWhereTheAdvantageIsTheirs) {
   const auto actor = MakeActor();
   RunningActor running(actor.get());
   DrawnBatches drawn;
-  const TransitionLayout layout = TransitionLayout::Of(Connect4Spec(), /*with_returns=*/true);
+  const TransitionLayout layout = TransitionLayout::Of(Connect4Spec(), {.returns = true});
   const absl::Status sampled = client_->Sample({.uniform = kDrawn}, layout, kLong, &drawn);
   ASSERT_TRUE(sampled.ok()) << sampled;
   EXPECT_EQ(drawn.unjudged_size, 0u);
@@ -50,9 +50,9 @@ TEST_F(ActorTest, ADrawnReturnIsThatOfItsEpisode) {
   config_.mutable_algorithm()->mutable_dbr()->set_advantage(DbrConfig::SIL);
   config_.mutable_replay()->set_samples_per_insert(0);
   const auto server = StartReplay(env);
-  const TransitionLayout layout = TransitionLayout::Of(env, /*with_returns=*/true);
+  const TransitionLayout layout = TransitionLayout::Of(env, {.returns = true});
   TransitionWriter writer({.address = replay_address_, .name = "actor-0", .layout = layout});
-  StepLoop loop(MakeLines(10), {.discount = 0.9, .with_returns = true}, Rng(1),
+  StepLoop loop(MakeLines(10), {.discount = 0.9, .columns = {.returns = true}}, Rng(1),
                 [&](const TransitionView& transition, float advantage, std::uint64_t version,
                     const std::optional<EpisodeEnd>& end) {
                   return writer.Append(transition, advantage, version, end, kLong);

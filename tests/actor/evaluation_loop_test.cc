@@ -259,6 +259,18 @@ TEST_F(EvaluationByUpdatesTest, AnIterationThatIsTrainedAgainIsNotEvaluatedAgain
   EXPECT_THAT(skipped(), Each(IsEmpty()));
 }
 
+TEST_F(EvaluationByUpdatesTest, EvaluatesThePolicyThatTheLearnerWaitsForOnce) {
+  const auto push_last_offline = [this] {
+    PolicySnapshot snapshot = UntrainedPolicy(Connect4Spec(), 3)->snapshot();
+    snapshot.ends_offline_phase = true;
+    newest_ = PolicyNetworks::Create(std::move(snapshot));
+  };
+  script_ = {[this] { Push(2); }, push_last_offline, push_last_offline, [this] { Push(4); }};
+  ASSERT_TRUE(loop_.Run().ok());
+  EXPECT_THAT(reports_, ElementsAre(Pair(2, "random"), Pair(3, "random"), Pair(4, "random")));
+  EXPECT_THAT(iterations(), ElementsAre(1, 1, 2));
+}
+
 TEST_F(EvaluationByUpdatesTest, TriesKeptReportsAgainWhileThereIsNoNewPolicy) {
   learner_ = absl::UnavailableError("nobody there");
   script_ = {[&] { Push(0); }, [] {}, [&] { learner_ = absl::OkStatus(); }};

@@ -173,7 +173,7 @@ TEST(StepLoopTest, WithReturnsEpisodesGoOutWholeAndBootstrapByTheCriticWhereThey
   constexpr double kDiscount = 0.8, kScale = 2;
   const auto policy = UntrainedPolicy(LineEnv().spec(), 5);
   std::vector<Seen> seen;
-  StepLoop loop(MakeLines(kEnvs), {.discount = kDiscount, .with_returns = true, .reward_scale = kScale},
+  StepLoop loop(MakeLines(kEnvs), {.discount = kDiscount, .columns = {.returns = true}, .reward_scale = kScale},
                 Rng(1), Into(&seen));
   for (int step = 0; step < kSteps; ++step) ASSERT_TRUE(loop.Step(*policy).ok());
   EXPECT_EQ(loop.counters().transitions, seen.size() + loop.held_back());
@@ -268,7 +268,7 @@ TEST(StepLoopTest, TransitionsOfSeveralStepsAreThePlainLoopsOverTheSingleSteps) 
 TEST(StepLoopTest, WithReturnsOfItsStartATransitionHasSeveralSteps) {
   const auto walk = [](int n) {
     std::vector<Seen> seen;
-    StepLoop loop(MakeLines(kEnvs), {.discount = 0.8, .with_returns = true, .n_step = n}, Rng(1),
+    StepLoop loop(MakeLines(kEnvs), {.discount = 0.8, .columns = {.returns = true}, .n_step = n}, Rng(1),
                   Into(&seen));
     const auto policy = UntrainedPolicy(LineEnv().spec(), 5);
     for (int step = 0; step < kSteps; ++step) EXPECT_TRUE(loop.Step(*policy).ok());

@@ -71,7 +71,7 @@ TEST(StationaryContinuationTest, TakesTheLastRewardsToGoOnForEver) {
 TEST(TransitionLayoutTest, AReturnTakesOneFloatBetweenDiscountAndNextObservation) {
   const EnvSpec spec{.name = "test", .observation_size = 2, .actions = {ActionKind::kDiscrete, 2}};
   const TransitionLayout without = TransitionLayout::Of(spec),
-                         with = TransitionLayout::Of(spec, /*with_returns=*/true);
+                         with = TransitionLayout::Of(spec, {.returns = true});
   EXPECT_EQ(with, kLayout);
   EXPECT_EQ(with.stride(), without.stride() + 1);
   EXPECT_EQ(with.return_offset(), without.discount_offset() + 1);

@@ -1,4 +1,4 @@
-// Tests BRAC, TD3 and AWAC: what an update changes, and that each solves a bandit with a known optimum.
+// Tests BRAC, TD3, TD3+BC, ReBRAC, AWAC, IQL and Cal-QL: what an update changes, and that each solves a bandit with a known optimum.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,6 +17,10 @@ AlgorithmSpec BaselineSpec(AlgorithmConfig::AlgorithmCase algorithm) {
   if (algorithm == AlgorithmConfig::kBrac) spec.config.mutable_brac();
   if (algorithm == AlgorithmConfig::kTd3) spec.config.mutable_td3();
   if (algorithm == AlgorithmConfig::kAwac) spec.config.mutable_awac();
+  if (algorithm == AlgorithmConfig::kTd3Bc) spec.config.mutable_td3_bc();
+  if (algorithm == AlgorithmConfig::kRebrac) spec.config.mutable_rebrac();
+  if (algorithm == AlgorithmConfig::kIql) spec.config.mutable_iql();
+  if (algorithm == AlgorithmConfig::kCalQl) spec.config.mutable_cal_ql()->set_conservative_actions(4);
   return spec;
 }
 
@@ -154,6 +158,47 @@ TEST(Awac, NoWeightPassesItsLimit) {
   EXPECT_LT(Metric(*algorithm, "train/weight_mean"), 5);
 }
 
+TEST(Rebrac, TheTargetLosesTheDistanceToTheNextActionInProportionToThePenalty) {
+  double target[3];
+  for (const int penalties : {0, 1, 2}) {
+    AlgorithmSpec spec = BaselineSpec(AlgorithmConfig::kRebrac);
+    spec.config.mutable_rebrac()->set_critic_penalty(penalties);
+    target[penalties] = Metric(*Trained(spec, 1), "train/target_mean");
+  }
+  EXPECT_GT(target[0], target[1]);
+  EXPECT_NEAR(target[0] - target[2], 2 * (target[0] - target[1]), 1e-4);
+}
+
+TEST(Rebrac, WithoutPenaltiesItIsTd3WithNormalisedValues) {
+  AlgorithmSpec rebrac = BaselineSpec(AlgorithmConfig::kRebrac), td3 = BaselineSpec(AlgorithmConfig::kTd3);
+  rebrac.config.mutable_rebrac()->set_policy_penalty(0);
+  rebrac.config.mutable_rebrac()->set_critic_penalty(0);
+  const TensorFile one = StateOf(*Trained(rebrac, 1)), other = StateOf(*Trained(td3, 1));
+  EXPECT_EQ(one.tensors.at("critic_1"), other.tensors.at("critic_1"));
+  EXPECT_NE(one.tensors.at("policy.adam.first"), other.tensors.at("policy.adam.first"));
+}
+
+TEST(Td3Bc, ASmallerWeightOfQStaysNearerToTheData) {
+  double distance[2];
+  for (const int strong : {0, 1}) {
+    AlgorithmSpec spec = BaselineSpec(AlgorithmConfig::kTd3Bc);
+    spec.config.set_learning_rate(0.01);
+    spec.config.mutable_td3_bc()->set_q_weight(strong == 1 ? 100 : 0);
+    distance[strong] = Metric(*Trained(spec, 100), "train/action_distance");
+  }
+  EXPECT_LT(distance[0], 0.8 * distance[1]);
+}
+
+TEST(CalQl, ReturnsAboveEveryValueTakeThePushOffThePolicysActions) {
+  std::vector<float> critics[2];
+  for (const bool calibrated : {false, true}) {
+    AlgorithmSpec spec = BaselineSpec(AlgorithmConfig::kCalQl);
+    spec.config.mutable_cal_ql()->set_calibrated(calibrated);
+    critics[calibrated ? 1 : 0] = StateOf(*Trained(spec, 1)).tensors.at("critic_1.adam.first");
+  }
+  EXPECT_NE(critics[0], critics[1]);
+}
+
 // A bandit: one state, one step, one dimension. The actions are given, and the reward is a function of them.
 class Bandit : public testing::Test {
  protected:
@@ -217,6 +262,55 @@ TEST_F(Bandit, Td3FindsTheBestAction) {
   const auto reward = [](float a) { return -std::abs(a - 0.4f); };
   Train(Spec(AlgorithmConfig::kTd3), UniformActions(), reward);
   EXPECT_NEAR(std::tanh(mean_), 0.4, 0.05);
+}
+
+TEST_F(Bandit, Td3BcStandsBetweenTheDataAndTheBestAction) {
+  // The data's mean action is 0, the best one 0.4, and Q is about -1.2 between them. The tent's slope of 1, times
+  // q_weight / 1.2, meets the pull's slope of 2 a.
+  const auto reward = [](float a) { return -std::abs(a - 0.4f) - 1; };
+  AlgorithmSpec spec = Spec(AlgorithmConfig::kTd3Bc);
+  spec.config.mutable_td3_bc()->set_q_weight(0.5);
+  Train(spec, UniformActions(), reward);
+  EXPECT_NEAR(std::tanh(mean_), 0.5 / (2 * 1.2), 0.05);
+  spec.config.mutable_td3_bc()->set_q_weight(50);
+  Train(spec, UniformActions(), reward);
+  EXPECT_NEAR(std::tanh(mean_), 0.4, 0.05);
+}
+
+TEST_F(Bandit, TheConservativeTermKeepsThePolicyWhereTheDataIs) {
+  // The reward rises without end. The data stays within +-0.4.
+  const auto reward = [](float a) { return 2 * a; };
+  AlgorithmSpec spec = Spec(AlgorithmConfig::kCalQl);
+  CalQlConfig* config = spec.config.mutable_cal_ql();
+  config->set_calibrated(false);
+  config->set_first_temperature(0.02);
+  config->set_temperature_learning_rate(0);
+  config->set_conservative_weight(0);
+  Train(spec, NormalActions(0.2), reward);
+  EXPECT_GT(std::tanh(mean_), 0.8);
+  config->set_conservative_weight(5);
+  Train(spec, NormalActions(0.2), reward);
+  EXPECT_LT(std::tanh(mean_), 0.5);
+}
+
+TEST_F(Bandit, IqlFindsTheExpectileOfTheDatasValues) {
+  // Rewards are uniform in [-0.98, 0.98]. The expectile e of a uniform on [-b, b] is b (sqrt(e) - sqrt(1 - e))
+  // / (sqrt(e) + sqrt(1 - e)).
+  AlgorithmSpec spec = Spec(AlgorithmConfig::kIql);
+  spec.config.mutable_iql()->set_expectile(0.9);
+  Train(spec, UniformActions(), [](float a) { return a; });
+  const double high = std::sqrt(0.9), low = std::sqrt(0.1);
+  EXPECT_NEAR(Metric(*algorithm_, "train/value_mean"), 0.98 * (high - low) / (high + low), 0.05);
+}
+
+TEST_F(Bandit, IqlFitsTheDataWeightedByItsAdvantages) {
+  AlgorithmSpec spec = Spec(AlgorithmConfig::kIql);
+  spec.config.mutable_iql()->set_temperature(0.02);
+  spec.config.mutable_iql()->set_max_weight(1e9);
+  const auto reward = [](float a) { return -(a - 0.4f) * (a - 0.4f); };
+  Train(spec, UniformActions(), reward);
+  EXPECT_NEAR(std::tanh(mean_), 0.4, 0.05);
+  EXPECT_NEAR(deviation_, 0.1 / (1 - 0.4 * 0.4), 0.05);
 }
 
 TEST_F(Bandit, AwacFitsTheDataWeightedByItsAdvantages) {

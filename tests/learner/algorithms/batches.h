@@ -3,6 +3,7 @@
 
 #include "core/rng.h"
 #include "learner/algorithm.h"
+#include "proto/config/config_file.h"
 
 namespace dbr {
 
@@ -25,14 +26,15 @@ inline Symmetry SmallSymmetry(ActionKind actions = ActionKind::kDiscrete) {
           .action = actions == ActionKind::kDiscrete ? std::vector<int>{1, 0, 2} : std::vector<int>{1, 0}};
 }
 
-// Random transitions, with returns where the algorithm needs them. In a discrete space action 2 is illegal in
+// Random transitions, with returns and next actions where the algorithm needs them. In a discrete space action 2 is illegal in
 // every third state.
 template <class Scalar>
 BasicBatch<Scalar> RandomBatch(const AlgorithmSpec& spec, int n, Rng& rng) {
   BasicBatch<Scalar> batch;
-  const int returns = spec.config.dbr().advantage() == DbrConfig::SIL ? 1 : 0;
-  batch.Resize({spec.observation_size, spec.actions.width(), spec.actions.mask_width(), returns}, n,
-               /*with_keys=*/true);
+  batch.Resize(TransitionLayout::Of({.name = spec.env, .observation_size = spec.observation_size,
+                                     .actions = spec.actions},
+                                    OptionalColumnsOf(spec.config)),
+               n, /*with_keys=*/true);
   const auto draw = [&](Scalar) { return static_cast<Scalar>(2 * rng.Uniform() - 1); };
   batch.observations = batch.observations.unaryExpr(draw).eval();
   batch.next_observations = batch.next_observations.unaryExpr(draw).eval();
@@ -48,8 +50,9 @@ BasicBatch<Scalar> RandomBatch(const AlgorithmSpec& spec, int n, Rng& rng) {
     if (restricted) batch.masks(2, j) = batch.next_masks(2, j) = 0;
     batch.actions(0, j) = static_cast<Scalar>(rng.Below(restricted ? 2 : 3));
   }
-  // The returns are drawn last, so that the rest is the same with and without them.
+  // The optional columns are drawn last, so that the rest is the same with and without them.
   for (Scalar& value : batch.returns) value = static_cast<Scalar>(3 * rng.Uniform() - 1);
+  batch.next_actions = batch.next_actions.unaryExpr(draw).eval();
   return batch;
 }
 

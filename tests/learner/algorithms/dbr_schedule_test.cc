@@ -225,6 +225,37 @@ TEST_P(Schedule, BehavioursFittedToTheBatchSeeTheirOwnPartAlone) {
   EXPECT_EQ(moved_minus, minus) << "no transition of D- has changed";
 }
 
+TEST_P(Schedule, WhatAPhaseSetsHoldsAndIsNotLearned) {
+  dbr()->set_first_temperature(0.5);
+  Start();
+  Update();
+  const MultiplierState multiplier = StateOf(State(), "log_alpha"), temperature = StateOf(State(), "log_temperature");
+  algorithm_->SetControls({.multiplier = 7, .temperature = 0.25});
+  for (int i = 0; i < 3; ++i) Update();
+  EXPECT_EQ(Metric("train/multiplier"), 7);
+  EXPECT_EQ(Metric("train/temperature"), 0.25);
+  EXPECT_EQ(StateOf(State(), "log_alpha"), multiplier);
+  EXPECT_EQ(StateOf(State(), "log_temperature"), temperature);
+  algorithm_->SetControls({});
+  Update();
+  EXPECT_NE(StateOf(State(), "log_alpha"), multiplier);
+  EXPECT_NE(StateOf(State(), "log_temperature"), temperature);
+}
+
+TEST_P(Schedule, TheTemperatureAimsAtTheEntropyThatAPhaseSets) {
+  if (spec_.actions.discrete()) GTEST_SKIP() << "its target is a share";
+  dbr()->set_first_temperature(0.5);
+  double temperatures[2];
+  for (const double target : {-100, 100}) {
+    Start();
+    algorithm_->SetControls({.target_entropy = target});
+    for (int i = 0; i < 5; ++i) Update();
+    temperatures[target > 0 ? 1 : 0] = Metric("train/temperature");
+  }
+  EXPECT_LT(temperatures[0], 0.5);
+  EXPECT_GT(temperatures[1], 0.5);
+}
+
 INSTANTIATE_TEST_SUITE_P(Actions, Schedule, testing::Values(ActionKind::kDiscrete, ActionKind::kContinuous),
                          [](const auto& info) {
                            return info.param == ActionKind::kDiscrete ? "Discrete" : "Continuous";

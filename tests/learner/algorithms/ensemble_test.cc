@@ -64,6 +64,7 @@ class Ensemble : public testing::TestWithParam<AlgorithmId> {
 
 TEST_P(Ensemble, EveryUpdateTrainsEveryCritic) {
   SetCritics(4);
+  const std::set<std::string> delayed = {"td3", "td3_bc", "rebrac"};
   const auto algorithm = Make();
   for (int i = 0; i < 5; ++i) {
     const TensorFile before = StateOf(*algorithm);
@@ -72,7 +73,7 @@ TEST_P(Ensemble, EveryUpdateTrainsEveryCritic) {
     for (int critic = 1; critic <= 4; ++critic) {
       const std::string name = absl::StrCat("critic_", critic);
       EXPECT_NE(after.tensors.at(name), before.tensors.at(name)) << name << " in update " << i;
-      if (GetParam().name == "td3" && i % 2 == 1) continue;  // its targets move with its policy
+      if (delayed.contains(GetParam().name) && i % 2 == 1) continue;  // targets move with the policy
       EXPECT_NE(after.tensors.at(name + ".target"), before.tensors.at(name + ".target")) << name;
     }
   }

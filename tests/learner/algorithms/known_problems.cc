@@ -8,6 +8,7 @@
 
 #include "learner/algorithms/registry.h"
 #include "nn/categorical.h"
+#include "proto/config/config_file.h"
 #include "tests/learner/runtime/tiny_replay.h"
 
 namespace dbr {
@@ -27,12 +28,14 @@ double RandomAction(const KnownProblem& problem, int state, Rng& rng) {
   }
 }
 
-Batch DataOf(const KnownProblem& problem, const MatrixX<float>& masks, Rng& rng) {
+Batch DataOf(const KnownProblem& problem, const OptionalColumns& columns, const MatrixX<float>& masks, Rng& rng) {
   Batch batch;
-  batch.Resize({problem.states, problem.actions.width(), problem.actions.mask_width()}, kRows,
-               /*with_keys=*/false);
+  batch.Resize(TransitionLayout::Of({.observation_size = problem.states, .actions = problem.actions}, columns),
+               kRows, /*with_keys=*/false);
   batch.observations.setZero();
   batch.next_observations.setZero();
+  batch.returns.setConstant(-1);  // below the value of every state
+  for (float& action : batch.next_actions.reshaped()) action = static_cast<float>(2 * rng.Uniform() - 1);
   batch.discounts.setConstant(static_cast<float>(problem.discount));
   for (Eigen::Index j = 0; j < kRows; ++j) {
     const auto state = static_cast<int>(rng.Below(static_cast<std::uint32_t>(problem.states)));
@@ -76,6 +79,17 @@ AlgorithmConfig ProblemSolvingConfig(const AlgorithmId& id) {
   } else if (id.name == "awac") {
     config.mutable_awac()->set_temperature(0.05);
     config.mutable_awac()->set_value_samples(4);
+  } else if (id.name == "td3_bc") {
+    config.mutable_td3_bc()->set_q_weight(50);
+  } else if (id.name == "rebrac") {
+    config.mutable_rebrac();
+  } else if (id.name == "iql") {
+    config.mutable_iql()->set_expectile(0.97);
+    config.mutable_iql()->set_temperature(0.05);
+  } else if (id.name == "cal_ql") {
+    config.mutable_cal_ql()->set_first_temperature(0.02);
+    config.mutable_cal_ql()->set_temperature_learning_rate(0);
+    config.mutable_cal_ql()->set_conservative_weight(0.01);
   } else if (id.name == "ddqn") {
     config.mutable_ddqn();
   } else if (id.name == "discrete_sac") {
@@ -98,7 +112,7 @@ TrainedOnProblem::TrainedOnProblem(const KnownProblem& problem, const AlgorithmC
   auto algorithm = MakeAlgorithm(spec);
   EXPECT_TRUE(algorithm.ok()) << algorithm.status();
   algorithm_ = *std::move(algorithm);
-  TinyReplay replay(DataOf(problem, Masks(), rng_), 11);
+  TinyReplay replay(DataOf(problem, OptionalColumnsOf(config), Masks(), rng_), 11);
   const absl::Status status = replay.Train(algorithm_.get(), updates);
   EXPECT_TRUE(status.ok()) << status;
   PolicySnapshot snapshot;

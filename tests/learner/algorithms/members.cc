@@ -21,6 +21,10 @@ AlgorithmSpec DefaultSpecOf(const AlgorithmId& id, std::uint64_t seed) {
   if (id.name == "brac") spec.config.mutable_brac()->set_variant(BracConfig::VP);
   if (id.name == "td3") spec.config.mutable_td3();
   if (id.name == "awac") spec.config.mutable_awac()->set_value_samples(3);
+  if (id.name == "td3_bc") spec.config.mutable_td3_bc();
+  if (id.name == "rebrac") spec.config.mutable_rebrac();
+  if (id.name == "iql") spec.config.mutable_iql();
+  if (id.name == "cal_ql") spec.config.mutable_cal_ql()->set_conservative_actions(3);
   EXPECT_EQ(AlgorithmName(spec.config), id.name) << "give the new algorithm its config here";
   return spec;
 }

@@ -1,4 +1,4 @@
-// Tests the losses of BRAC, TD3 and AWAC: every gradient against central differences in double.
+// Tests the losses of BRAC, TD3 with its kin, AWAC, IQL and Cal-QL: every gradient against central differences in double.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,7 +6,9 @@
 #include "core/rng.h"
 #include "learner/objectives/advantage_weights.h"
 #include "learner/objectives/behavior_kl_objective.h"
+#include "learner/objectives/conservative_regression.h"
 #include "learner/objectives/deterministic_policy.h"
+#include "learner/objectives/expectile.h"
 #include "learner/objectives/gaussian_likelihood.h"
 #include "tests/support/numeric.h"
 
@@ -82,15 +84,24 @@ TEST_F(BehaviorKlTest, AClippedLogStdHasTheGradientThatLeadsBackAlone) {
 class DeterministicPolicyTest : public PolicyLossTest {
  protected:
   // Returns the loss with the log-stds fixed as in TD3.
-  double Loss(const Matrix& mean, Matrix* gradient) {
+  double Loss(const Matrix& mean, Matrix* gradient, const DeterministicPolicyTerms& terms = {}) {
     Matrix output = Matrix::Constant(2 * kDimensions, kStates, kPolicyLogStd.min);
     output.topRows(kDimensions) = mean;
     const GaussianHead<double> pi = HeadOf(output, kPolicyLogStd);
-    const double loss = objective_.Evaluate(pi, observations_, &critics_);
+    const double loss = objective_.Evaluate(terms, pi, batch_, &critics_);
     if (gradient != nullptr) objective_.Gradient(pi, &critics_, gradient);
     return loss;
   }
 
+  static BasicBatch<double> BatchOf(const Matrix& observations, const Matrix& actions) {
+    BasicBatch<double> batch;
+    batch.observations = observations;
+    batch.actions = actions;
+    return batch;
+  }
+
+  const BasicBatch<double> batch_ =
+      BatchOf(observations_, Normal(kDimensions, kStates, rng_).array().tanh().matrix());
   DeterministicPolicyObjective<double> objective_;
 };
 
@@ -102,6 +113,24 @@ TEST_F(DeterministicPolicyTest, GradientMatchesDifferencesAndLeavesTheLogStdsAlo
   EXPECT_EQ(gradient.bottomRows(kDimensions).cwiseAbs().maxCoeff(), 0);
   ExpectIsGradient(
       gradient.topRows(kDimensions), [&](const Matrix& at) { return Loss(at, nullptr); }, mean);
+}
+
+TEST_F(DeterministicPolicyTest, ThePullToTheDataHasItsGradientToo) {
+  const DeterministicPolicyTerms terms{.normalize_q = true, .q_weight = 2.5, .penalty = 0.7};
+  const Matrix mean = output_.topRows(kDimensions);
+  Matrix gradient;
+  const double loss = Loss(mean, &gradient, terms);
+  const double scale = critics_.value1().cwiseAbs().mean();
+  const double distance = (mean.array().tanh().matrix() - batch_.actions).colwise().squaredNorm().mean();
+  EXPECT_NEAR(loss, -2.5 * critics_.value1().mean() / scale + 0.7 * distance, 1e-12);
+  EXPECT_NEAR(objective_.distance(), distance, 1e-12);
+  // The scale is a constant of the gradient: as a weight of its own it gives the same.
+  Matrix same;
+  const DeterministicPolicyTerms weighted{.q_weight = 2.5 / scale, .penalty = 0.7};
+  Loss(mean, &same, weighted);
+  ExpectNear(gradient, same, 1e-12);
+  ExpectIsGradient(
+      same.topRows(kDimensions), [&](const Matrix& at) { return Loss(at, nullptr, weighted); }, mean);
 }
 
 TEST_F(DeterministicPolicyTest, PinningGivesEveryStateTheLowestLogStd) {
@@ -122,6 +151,75 @@ TEST(SmoothedActionsTest, ClipsTheNoiseAndTheAction) {
   SmoothedActions<double>(mean, noise, {.deviation = 0.2, .limit = 0.5}, &actions);
   expected << 0.2, -0.5, 1, -0.5;
   ExpectNear(actions, expected, 1e-12);
+}
+
+TEST(ExpectileErrorTest, WeighsTheTwoSidesAndHasItsGradient) {
+  Rng rng(5);
+  const Matrix v = Normal(1, 6, rng);
+  const Vector q = Normal(6, 1, rng);
+  Matrix gradient, unused;
+  const double loss = ExpectileError<double>(v, q, 0.8, &gradient);
+  double sum = 0;
+  for (int j = 0; j < 6; ++j) sum += (q[j] > v(0, j) ? 0.8 : 0.2) * std::pow(q[j] - v(0, j), 2);
+  EXPECT_NEAR(loss, sum / 6, 1e-12);
+  ExpectIsGradient(
+      gradient, [&](const Matrix& at) { return ExpectileError<double>(at, q, 0.8, &unused); }, v);
+}
+
+class ConservativeLossTest : public testing::Test {
+ protected:
+  static constexpr int kCount = 3;
+
+  ConservativeLossTest() {
+    draws_.actions = Normal(kDimensions, kCount * kStates, rng_);
+    draws_.log_prob = Normal(kCount * kStates, 1, rng_);
+    draws_.unbounded = kStates;
+  }
+  double Loss(const Matrix& q, bool calibrated, Matrix* gradient) {
+    return ConservativeLoss<double>(q, y_, floor_, draws_, {.weight = 1.7, .calibrated = calibrated},
+                                    gradient);
+  }
+
+  Rng rng_{8};
+  ConservativeDraws<double> draws_;
+  const Matrix q_ = Normal(1, (1 + kCount) * kStates, rng_);
+  const Vector y_ = Normal(kStates, 1, rng_);
+  const Vector floor_ = Normal(kStates, 1, rng_);
+};
+
+TEST_F(ConservativeLossTest, GradientMatchesDifferencesWithAndWithoutTheFloor) {
+  for (const bool calibrated : {true, false}) {
+    Matrix gradient, unused;
+    Loss(q_, calibrated, &gradient);
+    ExpectIsGradient(
+        gradient, [&](const Matrix& at) { return Loss(at, calibrated, &unused); }, q_);
+  }
+}
+
+TEST_F(ConservativeLossTest, NoDrawOfAPolicyIsPushedBelowTheFloor) {
+  Matrix gradient;
+  Loss(q_, true, &gradient);
+  int held = 0;
+  for (int k = 0; k < kCount; ++k) {
+    for (int j = 0; j < kStates; ++j) {
+      const int column = kStates + k * kStates + j;
+      const bool is_held = k > 0 && q_(0, column) < floor_[j];
+      EXPECT_EQ(gradient(0, column) == 0, is_held) << "draw " << k << " of state " << j;
+      held += is_held;
+    }
+  }
+  EXPECT_GT(held, 0);
+}
+
+TEST_F(ConservativeLossTest, OneDrawAtEachStateIsTheDifferenceOfTheTwoValues) {
+  draws_.actions.conservativeResize(kDimensions, kStates);
+  draws_.log_prob = Vector::Zero(kStates);
+  const Matrix q = q_.leftCols(2 * kStates);
+  Matrix gradient;
+  const Matrix data = q.leftCols(kStates);
+  const double expected = (data.row(0).transpose() - y_).squaredNorm() / kStates +
+                          1.7 * (q.rightCols(kStates).mean() - data.mean());
+  EXPECT_NEAR(Loss(q, false, &gradient), expected, 1e-12);
 }
 
 TEST(AdvantageWeightsTest, AreExponentialUpToTheLimit) {

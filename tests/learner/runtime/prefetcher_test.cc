@@ -23,8 +23,8 @@ class FailingReplay : public Replay::Service {
  public:
   explicit FailingReplay(grpc::StatusCode code) : code_(code) {}
 
-  grpc::Status Sample(grpc::ServerContext*, const SampleRequest*, SampleReply* reply) override {
-    if (draws_++ == 0) return grpc::Status(code_, "as this test wants it");
+  grpc::Status Sample(grpc::ServerContext*, const SampleRequest* request, SampleReply* reply) override {
+    if (draws_++ == 0 && code_ != grpc::StatusCode::OK) return grpc::Status(code_, "as this test wants it");
     for (SampledPart* part : {reply->mutable_uniform(), reply->mutable_plus(), reply->mutable_minus()}) {
       SetLayout(kLayout, part->mutable_transitions());
     }
@@ -32,6 +32,8 @@ class FailingReplay : public Replay::Service {
     const TransitionView row{.observation = observation,
                              .action = action,
                              .mask = {},
+                             .reward = static_cast<float>(request->seed_buffer_share()),
+                             .discount = static_cast<float>(request->first_transitions()),
                              .next_observation = observation,
                              .next_mask = {}};
     AppendTransition(row, kUnjudged, 0, reply->mutable_uniform()->mutable_transitions());
@@ -87,6 +89,24 @@ TEST_F(PrefetcherTest, ABatchWithoutItsKeysIsAFinalError) {
   const absl::Status status = NextFrom(&replay).status();
   EXPECT_TRUE(absl::IsInvalidArgument(status)) << status;
   EXPECT_THAT(std::string(status.message()), testing::HasSubstr("keys: expected 1"));
+}
+
+TEST_F(PrefetcherTest, BatchesOfEarlierTermsAreDropped) {
+  FailingReplay replay(grpc::StatusCode::OK);
+  const auto server = StartServer({.address = "unix:" + folder_.path() + "/replay.sock"}, {&replay});
+  ASSERT_TRUE(server.ok()) << server.status();
+  ReplayClient client(server->address);
+  Prefetcher prefetcher(&client, {.counts = {.uniform = 1}, .layout = kLayout, .depth = 4});
+  const auto before = prefetcher.Next();
+  ASSERT_TRUE(before.ok()) << before.status();
+  EXPECT_EQ((*before)->uniform.rewards[0], 0);
+  prefetcher.SetTerms({.seed_buffer_share = 0.5, .first_transitions = 7});
+  for (int i = 0; i < 8; ++i) {
+    const auto after = prefetcher.Next();
+    ASSERT_TRUE(after.ok()) << after.status();
+    EXPECT_EQ((*after)->uniform.rewards[0], 0.5f);
+    EXPECT_EQ((*after)->uniform.discounts[0], 7);
+  }
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -47,8 +48,12 @@ class TinyReplay {
     }
     const Eigen::Index n = members_.empty() ? 0 : count;
     const auto rows_of = [](const auto& matrix) { return static_cast<int>(matrix.rows()); };
-    batch->Resize({rows_of(rows_.observations), rows_of(rows_.actions), rows_of(rows_.masks)}, n,
-                  /*with_keys=*/true);
+    batch->Resize({.observation_width = rows_of(rows_.observations),
+                   .action_width = rows_of(rows_.actions),
+                   .mask_width = rows_of(rows_.masks),
+                   .return_width = rows_.returns.size() > 0 ? 1 : 0,
+                   .next_action_width = rows_of(rows_.next_actions)},
+                  n, /*with_keys=*/true);
     for (Eigen::Index j = 0; j < n; ++j) {
       const std::size_t row = members_[rng_.Below(static_cast<std::uint32_t>(members_.size()))];
       Copy(static_cast<Eigen::Index>(row), j, batch);
@@ -57,13 +62,14 @@ class TinyReplay {
   }
 
   void Copy(Eigen::Index row, Eigen::Index j, Batch* batch) const {
-    batch->observations.col(j) = rows_.observations.col(row);
-    batch->actions.col(j) = rows_.actions.col(row);
-    batch->masks.col(j) = rows_.masks.col(row);
-    batch->rewards[j] = rows_.rewards[row];
-    batch->discounts[j] = rows_.discounts[row];
-    batch->next_observations.col(j) = rows_.next_observations.col(row);
-    batch->next_masks.col(j) = rows_.next_masks.col(row);
+    const auto copy = [row, j](const auto& from, auto& to) {
+      if constexpr (std::is_same_v<decltype(to), MatrixX<float>&>) {
+        to.col(j) = from.col(row);
+      } else if (from.size() > 0) {
+        to[j] = from[row];
+      }
+    };
+    ForEachColumn(copy, rows_, *batch);
   }
 
   const Batch rows_;

@@ -83,7 +83,8 @@ class TrainerTest : public testing::Test {
                        .metrics = metrics_.get(),
                        .saver = &saver_,
                        .prefetcher = nullptr,
-                       .relabeller = nullptr};
+                       .relabeller = nullptr,
+                       .finetune = &finetune_};
     const BatchNeeds needs = parts.algorithm->needs();
     draws_ = std::make_unique<ReplayClient>(replay_->address());
     labels_ = std::make_unique<ReplayClient>(replay_->address());
@@ -122,6 +123,7 @@ class TrainerTest : public testing::Test {
   TempDir folder_;
   std::unique_ptr<ReplayServer> replay_;
   std::unique_ptr<MetricsSink> metrics_;
+  Finetune finetune_{Config()};
   PolicyService service_{[](const EvaluationReport&) {}};
   Saver saver_{RunFolder{folder_.path()}, 3};
   std::unique_ptr<ReplayClient> draws_, labels_;

@@ -134,6 +134,45 @@ TEST(ConfigCombinations, TheMunchausenTermIsOfOneStep) {
   EXPECT_THAT(ErrorsOfAlgorithm("dbr { munchausen_weight: 0.9 }"), ElementsAre());
 }
 
+std::string ErrorOf(const std::string& text) {
+  return std::string(ParseConfig(text).status().message());
+}
+
+TEST(ConfigCombinations, FineTuningNeedsTwoPhasesAndSetsTheShare) {
+  EXPECT_TRUE(ParseConfig("learner { offline_updates: 10 } finetune { mode: AUTO }").ok());
+  EXPECT_THAT(ErrorOf("finetune { mode: AUTO }"),
+              HasSubstr("finetune.mode: expected NONE, or learner.offline_updates above 0"));
+  EXPECT_THAT(ErrorOf("learner { offline_updates: 10 max_updates: 10 } finetune { mode: RETAIN }"),
+              HasSubstr("found RETAIN with 10 and 10"));
+  EXPECT_THAT(ErrorOf("learner { offline_updates: 10 } finetune { mode: WARM_START } "
+                      "replay { seed_buffer { share: 0.5 } }"),
+              HasSubstr("replay.seed_buffer.share: expected 0 and no decay with finetune.mode: WARM_START"));
+}
+
+TEST(ConfigCombinations, ASchedulesFieldsFitTogether) {
+  const auto error = [](const std::string& schedule, const std::string& algorithm = "dbr { first_temperature: 1 }") {
+    return ErrorOf("learner { offline_updates: 10 } algorithm { " + algorithm + " } finetune { mode: AUTO " +
+                   schedule + " }");
+  };
+  EXPECT_EQ(error("multiplier { first: 20 last: 1 updates: 5 }"), "");
+  EXPECT_EQ(error("target_entropy { first: -4 last: -1 updates: 5 }"), "");
+  EXPECT_THAT(error("multiplier { first: 20 last: 1 }"),
+              HasSubstr("finetune.multiplier.updates: expected above 0 with first and last, found 0"));
+  EXPECT_THAT(error("temperature { first: 0.1 updates: 5 }"),
+              HasSubstr("finetune.temperature: expected first and last above 0, found 0.1 and 0"));
+  EXPECT_THAT(error("multiplier { first: 20 last: 1 updates: 5 }", "sac {}"),
+              HasSubstr("finetune.multiplier: expected algorithm dbr"));
+  EXPECT_THAT(error("multiplier { first: 20 last: 1 updates: 5 }",
+                    "dbr { constraint: NONE first_temperature: 1 target_entropy: -1 }"),
+              HasSubstr("finetune.multiplier: expected a constraint other than NONE"));
+  EXPECT_THAT(error("target_entropy { first: -4 last: -1 updates: 5 }", "dbr {}"),
+              HasSubstr("finetune.target_entropy: expected algorithm.dbr.first_temperature above 0"));
+  EXPECT_THAT(error("target_entropy { last: -1 updates: 5 } temperature { first: 1 last: 1 updates: 5 }"),
+              HasSubstr("finetune.target_entropy: expected none with finetune.temperature"));
+  EXPECT_THAT(ErrorOf("finetune { multiplier { first: 20 last: 1 updates: 5 } }"),
+              HasSubstr("finetune.mode: expected RETAIN, WARM_START or AUTO with a schedule, found NONE"));
+}
+
 TEST(ConfigCombinations, AllAreReportedAtOnceBesideFieldsOutOfBounds) {
   EXPECT_THAT(
       ErrorsOfAlgorithm("discount: 2 critics: 1 n_step: 2 dbr { constraint: NONE first_temperature: 1 "

@@ -251,11 +251,21 @@ TEST(WithDefaultsTest, ADefaultThatIsWrittenOutChangesNothing) {
   EXPECT_TRUE(MessageDifferencer::Equals(WithDefaults(short_one), WithDefaults(WithDefaults(short_one))));
 }
 
-TEST(NeedsReturnsTest, OnlyTheAdvantageOfSelfImitationTakesThem) {
-  EXPECT_FALSE(NeedsReturns(Parsed("").algorithm()));
-  EXPECT_FALSE(NeedsReturns(Parsed("algorithm { dbr { advantage: ARM_CUMULATIVE } }").algorithm()));
-  EXPECT_TRUE(NeedsReturns(Parsed("algorithm { dbr { advantage: SIL } }").algorithm()));
-  EXPECT_FALSE(NeedsReturns(Parsed("algorithm { sac {} }").algorithm()));
+TEST(OptionalColumnsOfTest, ReturnsAreForSelfImitationAndTheFloorOfQ) {
+  const auto returns = [](const char* text) { return OptionalColumnsOf(Parsed(text).algorithm()).returns; };
+  EXPECT_FALSE(returns(""));
+  EXPECT_FALSE(returns("algorithm { dbr { advantage: ARM_CUMULATIVE } }"));
+  EXPECT_TRUE(returns("algorithm { dbr { advantage: SIL } }"));
+  EXPECT_FALSE(returns("algorithm { sac {} }"));
+  EXPECT_TRUE(returns("algorithm { cal_ql {} }"));
+}
+
+TEST(OptionalColumnsOfTest, NextActionsAreForThePenaltyOfTheTarget) {
+  const auto next_actions = [](const char* text) { return OptionalColumnsOf(Parsed(text).algorithm()).next_actions; };
+  EXPECT_FALSE(next_actions(""));
+  EXPECT_FALSE(next_actions("algorithm { td3_bc {} }"));
+  EXPECT_TRUE(next_actions("algorithm { rebrac {} }"));
+  EXPECT_FALSE(next_actions("algorithm { rebrac { critic_penalty: 0 } }"));
 }
 
 TEST(LoadConfigTest, ErrorsStartWithTheFile) {

@@ -119,5 +119,23 @@ TEST(RateLimiter, CountsOnlineRowsFromTheFirstWhereTheSeedHasTheMinimum) {
               AllOf(HasSubstr("seed buffer 6"), HasSubstr("(inserted - 4)")));
 }
 
+TEST(RateLimiter, CountsFromTheFirstTransitionsThatAreAskedFor) {
+  RateLimiter limiter = Make(4, 40, 10);
+  limiter.CountFrom(50);
+  limiter.CountFrom(20);  // never less
+  const auto counts = [](std::uint64_t inserted, std::uint64_t sampled) {
+    return RateLimiter::Counts{
+        .inserted = inserted, .sampled = sampled, .size = 100 + inserted, .seed_buffer = 100};
+  };
+  EXPECT_FALSE(limiter.CanDraw(counts(0, 0), 1)) << "free draws from the seed buffer are over";
+  EXPECT_FALSE(limiter.CanDraw(counts(49, 0), 1));
+  EXPECT_THAT(limiter.WhyDrawWaits(counts(49, 0), 1), HasSubstr("first 50 transitions"));
+  EXPECT_TRUE(limiter.CanInsert(counts(49, 0))) << "nothing is owed for them";
+  EXPECT_TRUE(limiter.CanDraw(counts(50, 0), 40));
+  EXPECT_FALSE(limiter.CanDraw(counts(50, 0), 41));
+  EXPECT_TRUE(limiter.CanInsert(counts(60, 0)));
+  EXPECT_FALSE(limiter.CanInsert(counts(61, 0)));
+}
+
 }  // namespace
 }  // namespace dbr

@@ -146,6 +146,40 @@ TEST_F(BufferWithSeedBuffer, TheShareMayMoveWithTheRowsThatComeIn) {
   EXPECT_EQ(SeedBufferAmong(uniform_, 1000, 60), 0) << "0 at the end of a decay is none, not the sizes'";
 }
 
+TEST_F(BufferWithSeedBuffer, ADrawMayAskForAShareOfItsOwn) {
+  MakeSeeded(60);
+  ASSERT_TRUE(Insert(1001, 20, 1).ok());
+  const auto draw = [&](double share) {
+    const DrawRequest request{.counts = {1000, 1000, 0}, .allow_empty_partitions = true,
+                              .seed_buffer_share = share};
+    ASSERT_TRUE(
+        buffer_->Draw(request, {uniform_.columns(), plus_.columns(), minus_.columns()}, kNow, &result_).ok());
+  };
+  draw(0);
+  EXPECT_EQ(SeedBufferAmong(uniform_, 1000, 60), 0) << "none, and not the sizes' share";
+  EXPECT_EQ(SeedBufferAmong(plus_, 1000, 60), 0);
+  draw(0.5);
+  EXPECT_EQ(SeedBufferAmong(uniform_, 1000, 60), 500);
+  ASSERT_TRUE(Draw(1000, 0, 0).ok());
+  EXPECT_NEAR(static_cast<double>(SeedBufferAmong(uniform_, 1000, 60)), 750, 70) << "the options' again";
+}
+
+TEST_F(BufferWithSeedBuffer, ADrawMayWaitForTheFirstTransitionsBesideTheSeedBuffer) {
+  buffer_options_.limiter = {.samples_per_insert = 2, .tolerance = 20, .min_size = 50};
+  MakeSeeded(60);
+  const DrawRequest request{.counts = {10, 0, 0}, .first_transitions = 30};
+  const auto draw = [&] {
+    return buffer_->Draw(request, {uniform_.columns(), plus_.columns(), minus_.columns()}, kNow, &result_);
+  };
+  EXPECT_TRUE(absl::IsDeadlineExceeded(draw()));
+  ASSERT_TRUE(Insert(1001, 29, 1).ok()) << "more than the tolerance lets in where draws are owed";
+  EXPECT_TRUE(absl::IsDeadlineExceeded(draw()));
+  ASSERT_TRUE(Insert(1030, 1, 1).ok());
+  EXPECT_TRUE(draw().ok());
+  EXPECT_TRUE(draw().ok());
+  EXPECT_TRUE(absl::IsDeadlineExceeded(draw())) << "2 * (30 - 30) + 20 are drawn";
+}
+
 TEST_F(BufferWithSeedBuffer, WithoutASettingTheShareIsThatOfTheSizes) {
   MakeSeeded(60);
   ASSERT_TRUE(Insert(1001, 20, 1).ok());

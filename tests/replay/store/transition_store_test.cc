@@ -233,7 +233,16 @@ TEST_F(StoreInAFile, AStoreWithoutTheReturnsThatARunNeedsIsRefusedAndTheOtherWay
   options_.resume = false;
   { Open(); }
   options_.layout = kSmallLayout;
-  EXPECT_THAT(ResumeError().ToString(), HasSubstr("(observation/action/mask), with returns, capacity 100. "));
+  EXPECT_THAT(ResumeError().ToString(), HasSubstr("(observation/action/mask), with returns, without next actions, "
+                                                    "capacity 100. "));
+}
+
+TEST_F(StoreInAFile, AStoreWithoutTheNextActionsThatARunNeedsIsRefused) {
+  { Open(); }
+  options_.layout.next_action_width = options_.layout.action_width;
+  EXPECT_THAT(ResumeError().ToString(),
+              AllOf(HasSubstr("with next actions"), HasSubstr("found environment"),
+                    HasSubstr("without returns, without next actions, capacity 100. ")));
 }
 
 TEST_F(StoreInAFile, AnotherCapacityIsRefused) {
