@@ -55,10 +55,10 @@ void CalQl<Scalar>::DrawActions(Eigen::Index n) {
   conservative_.log_prob.head(each).setConstant(static_cast<Scalar>(-std::log(2.0) * dimensions));
   Eigen::Index first = each;
   for (const GaussianHead<Scalar>* head : {&head_, &next_head_}) {
-    FillNormal(networks_.rng, dimensions, each, &noise_);
-    draws_.Draw(*head, noise_);
-    conservative_.actions.middleCols(first, each) = draws_.sample().action;
-    conservative_.log_prob.segment(first, each) = draws_.sample().log_prob;
+    FillNormal(networks_.rng, dimensions, each, &conservative_noise_);
+    conservative_draws_.Draw(*head, conservative_noise_);
+    conservative_.actions.middleCols(first, each) = conservative_draws_.sample().action;
+    conservative_.log_prob.segment(first, each) = conservative_draws_.sample().log_prob;
     first += each;
   }
 }

@@ -54,11 +54,12 @@ class CalQl : public ActorCriticAlgorithm<SoftNetworks<Scalar>> {
   Scalar target_entropy_;  // nats
 
   GaussianHead<Scalar> head_, next_head_;  // pi at s, pi at s'
-  SampledActions<Scalar> draws_, next_draws_;
+  SampledActions<Scalar> next_draws_, conservative_draws_;
   ConservativeDraws<Scalar> conservative_;
   ConservativeRegression<Scalar> regression_;
   SoftPolicyObjective<Scalar> objective_;
-  MatrixX<Scalar> noise_, d_output_;    // [dimensions x draws * n], [2 * dimensions x n]
+  // [dimensions x n], [dimensions x conservative_actions * n], [2 * dimensions x n]
+  MatrixX<Scalar> noise_, conservative_noise_, d_output_;
   VectorX<Scalar> next_value_, value_;  // [n]
 };
 

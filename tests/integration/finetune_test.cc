@@ -34,9 +34,10 @@ class FinetuneTest : public testing::Test {
     ASSERT_EQ(status, 0) << output;
   }
 
-  std::vector<std::string> Arguments(std::vector<std::string> more = {}) const {
+  std::vector<std::string> Arguments(std::vector<std::string> more = {},
+                                     const std::string& config = "finetune") const {
     std::vector<std::string> arguments = {
-        "launch",        absl::StrCat(DBR_SOURCE_DIR, "/tests/integration/finetune.textproto"),
+        "launch",        absl::StrCat(DBR_SOURCE_DIR, "/tests/integration/", config, ".textproto"),
         "--run-dir",     run_.root,
         "--seed-buffer", seed_buffer_};
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -139,6 +140,51 @@ TEST_F(FinetuneTest, OfflineAloneStartsNoActors) {
   EXPECT_EQ(summary["transitions"], 0);
   EXPECT_EQ(summary["games"], 0);
   EXPECT_TRUE(summary["returns"]["lowest_online"].is_null());
+}
+
+// The seed buffer's actions are random, its episodes return about 20, and 200 updates do not better that. The
+// same learner with actors stands upright for much of an episode in the end: 90 to 1,000 after 12,000 steps.
+TEST_F(FinetuneTest, TheOnlinePartEndsAboveTheOfflinePart) {
+  const auto [status, output] = RunProgram("dbr", Arguments({}, "finetune_designed"));
+  ASSERT_EQ(status, 0) << output;
+  EXPECT_THAT(output, AllOf(HasSubstr("fine-tuning: the offline policy has a mean return of"),
+                            HasSubstr("RETAIN, the seed buffer keeps 50% of each draw")));
+  const Json summary = Summary(run_);
+  const Json& offline = summary["returns"]["after_offline"];
+  EXPECT_EQ(offline["updates"], kOfflineUpdates) << "the evaluation is of the very moment";
+  EXPECT_EQ(offline["steps"], 0);
+  EXPECT_LT(offline["return_mean"], 60);
+  EXPECT_GT(summary["returns"]["end"]["mean"].get<double>(), 2 * offline["return_mean"].get<double>());
+  // The first 500 transitions are the offline policy's: no update owes them anything.
+  EXPECT_LE(summary["updates"], kOfflineUpdates + summary["transitions"].get<int>() - 500 + 110);
+}
+
+TEST_F(FinetuneTest, ADesignedRunGoesOnInThePhaseInWhichItWasStopped) {
+  DbrProcess offline("dbr", Arguments({"--set", "learner.offline_updates=1000000"}, "finetune_designed"));
+  ASSERT_TRUE(offline.Await([&] { return Counter(run_, "relabelled") > 0; })) << offline.output();
+  offline.Signal(SIGINT);
+  EXPECT_EQ(offline.Wait(), 130) << offline.output();
+  EXPECT_THAT(offline.output(), Not(HasSubstr("fine-tuning:")));
+
+  const std::vector<std::string> resume = {"launch", "--resume", "--run-dir", run_.root,
+                                           "--set", "learner.offline_updates=200",
+                                           "--set", "launch.max_steps=100000"};
+  DbrProcess online("dbr", resume);
+  ASSERT_TRUE(online.Await([&] { return Counter(run_, "inserted") > 1000; })) << online.output();
+  online.Signal(SIGINT);
+  EXPECT_EQ(online.Wait(), 130) << online.output();
+  EXPECT_THAT(online.output(), HasSubstr("fine-tuning:"));
+  const Json first = Summary(run_);
+
+  const std::uint64_t steps = first["transitions"].get<std::uint64_t>() + 500;
+  const auto [status, output] = RunProgram(
+      "dbr", {"launch", "--resume", "--run-dir", run_.root, "--set", absl::StrCat("launch.max_steps=", steps),
+              "--set", "learner.offline_updates=200"});
+  ASSERT_EQ(status, 0) << output;
+  EXPECT_THAT(output, HasSubstr("RETAIN, the seed buffer keeps 50% of each draw"));
+  EXPECT_THAT(Contents(run_.log("learner")), HasSubstr("resumed from"));
+  const Json second = Summary(run_);
+  EXPECT_GE(second["updates"].get<int>(), first["updates"].get<int>() + 300) << "no wait for 500 transitions";
 }
 
 TEST_F(FinetuneTest, StopsWhereAnEvaluationReachesTheReturn) {

@@ -112,6 +112,28 @@ constexpr Effect kEffects[] = {
     {"td3", "target_noise_limit", "target_noise_limit: 0.1"},
     {"td3", "policy_delay", "policy_delay: 3"},
 
+    {"td3_bc", "target_noise", "target_noise: 0.4"},
+    {"td3_bc", "target_noise_limit", "target_noise_limit: 0.1"},
+    {"td3_bc", "policy_delay", "policy_delay: 3"},
+    {"td3_bc", "q_weight", "q_weight: 5"},
+
+    {"rebrac", "target_noise", "target_noise: 0.4"},
+    {"rebrac", "target_noise_limit", "target_noise_limit: 0.1"},
+    {"rebrac", "policy_delay", "policy_delay: 3"},
+    {"rebrac", "policy_penalty", "policy_penalty: 1"},
+    {"rebrac", "critic_penalty", "critic_penalty: 0.5"},
+
+    {"iql", "expectile", "expectile: 0.9"},
+    {"iql", "temperature", "temperature: 0.1"},
+    {"iql", "max_weight", "max_weight: 0.5"},
+
+    {"cal_ql", "first_temperature", "first_temperature: 0.1"},
+    {"cal_ql", "temperature_learning_rate", "temperature_learning_rate: 0.1"},
+    {"cal_ql", "target_entropy", "target_entropy: 5", "temperature_learning_rate: 0.1"},
+    {"cal_ql", "conservative_weight", "conservative_weight: 1"},
+    {"cal_ql", "conservative_actions", "conservative_actions: 3"},
+    {"cal_ql", "calibrated", "calibrated: false"},
+
     {"awac", "temperature", "temperature: 0.2"},
     {"awac", "max_weight", "max_weight: 0.5"},
     {"awac", "value_samples", "value_samples: 3"},
