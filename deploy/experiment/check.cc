@@ -132,11 +132,20 @@ std::string WrongMeasure(const Task& task, const Config& config, const EnvSpec& 
   return "";
 }
 
-// Whether a task of kind OFFLINE is one; "" where it is.
-std::string WrongOffline(const Config& config) {
-  if (config.replay().seed_buffer().path().empty())
-    return "replay.seed_buffer.path: expected the seed buffer of an offline task, found none";
-  if (TrainsOfflineAlone(config)) return "";
+// Whether a task with a seed buffer is of its kind; "" where it is, and for tasks of other kinds.
+std::string WrongKind(Task::Kind kind, const Config& config) {
+  if (kind != Task::OFFLINE && kind != Task::FINETUNE) return "";
+  const bool offline = kind == Task::OFFLINE;
+  if (config.replay().seed_buffer().path().empty()) {
+    return absl::StrCat("replay.seed_buffer.path: expected the seed buffer of ",
+                        offline ? "an offline" : "a fine-tuning", " task, found none");
+  }
+  if (TrainsOfflineAlone(config) == offline) return "";
+  if (!offline) {
+    return absl::StrCat("expected a fine-tuning task to have actors, with learner.max_updates of 0 or above ",
+                        "learner.offline_updates, found ", config.learner().max_updates(), " and ",
+                        config.learner().offline_updates());
+  }
   return absl::StrCat("expected an offline task to have learner.max_updates of 1 to ",
                       "learner.offline_updates, so that no actor acts, found ",
                       config.learner().max_updates(), " and ", config.learner().offline_updates());
@@ -198,9 +207,9 @@ void FindPairErrors(const Experiment& experiment, const std::vector<Cell>& cells
     const std::string measure =
         fits.ok() ? WrongMeasure(TaskOf(experiment, cell), cell.config, *env) : std::string();
     if (!measure.empty()) note(measure);
-    const std::string offline = cell.kind == Task::OFFLINE ? WrongOffline(cell.config) : "";
-    if (!offline.empty()) {
-      note(offline);
+    const std::string kind = WrongKind(cell.kind, cell.config);
+    if (!kind.empty()) {
+      note(kind);
     } else if (!RunLimits(cell.config).any()) {
       note(
           "expected an end, found none: set learner.max_updates, launch.max_steps, launch.max_episodes or "

@@ -17,6 +17,8 @@ const Config& OfKind(const Scale& scale, Task::Kind kind) {
       return scale.offline();
     case Task::ONLINE:
       return scale.online();
+    case Task::FINETUNE:
+      return scale.finetune();
     case Task::GAMES:
       break;
   }

@@ -36,13 +36,13 @@ std::string FileName(const Runs& runs, const Row& row) {
   return FileName(row.measure.opponent().empty() ? task : absl::StrCat(task, "-", row.measure.opponent()));
 }
 
-// Offline tasks are named ENVIRONMENT-QUALITY.
+// Tasks with a seed buffer are named ENVIRONMENT-QUALITY.
 std::string GroupOf(const Task& task) {
   if (task.kind() == Task::ONLINE) return "online";
   if (task.kind() == Task::GAMES) return "games";
   const std::size_t dash = task.name().rfind('-');
   return absl::StrCat(
-      "offline", dash == std::string::npos ? "" : absl::StrCat(", ", task.name().substr(dash + 1), " data"));
+      task.kind() == Task::FINETUNE ? "fine-tuned" : "offline", dash == std::string::npos ? "" : absl::StrCat(", ", task.name().substr(dash + 1), " data"));
 }
 
 std::optional<Estimate> EstimateOf(const Published* published) {

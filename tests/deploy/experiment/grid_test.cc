@@ -21,6 +21,7 @@ namespace dbr {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsSupersetOf;
@@ -314,6 +315,23 @@ TEST_F(GridTest, AnOfflineTaskHasASeedBufferAndNoActors) {
       IsSupersetOf({std::string(
           "task 'hopper-medium', contender 'dbr': expected an offline task to have "
           "learner.max_updates of 1 to learner.offline_updates, so that no actor acts, found 8 and 7")}));
+}
+
+TEST_F(GridTest, AFineTuningTaskHasASeedBufferAndActors) {
+  const std::pair<std::string, std::string> kind = {"kind: OFFLINE", "kind: FINETUNE"},
+                                            scale = {"scale {\n  name: \"smoke\" seeds: 2",
+                                                     "scale {\n  name: \"smoke\" seeds: 2\n  finetune { learner { "
+                                                     "offline_updates: 5 } launch { max_steps: 8 } }"};
+  const auto grid = MakeCheckedGrid(Changed({kind, scale}), Options());
+  ASSERT_TRUE(grid.ok()) << grid.status();
+  for (const Cell& cell : grid->cells) {
+    if (cell.task == "hopper-medium") EXPECT_EQ(cell.config.learner().offline_updates(), 5u) << "its scale's";
+  }
+  EXPECT_THAT(ErrorsOf({kind, scale, {"replay { seed_buffer { path: \"hopper-medium.hdf5\" } }", ""}}),
+              Contains(HasSubstr("expected the seed buffer of a fine-tuning task, found none")));
+  EXPECT_THAT(ErrorsOf({kind, scale, {"offline_updates: 5 }", "offline_updates: 5 max_updates: 5 }"}}),
+              Contains(HasSubstr("expected a fine-tuning task to have actors, with learner.max_updates of 0 or "
+                                 "above learner.offline_updates, found 5 and 5")));
 }
 
 TEST_F(GridTest, EveryRunComesToAnEnd) {
