@@ -14,9 +14,9 @@
 namespace dbr {
 
 // Takes a transition of environment `env` whose next action is known. It is valid during the call.
-using NextActionSink = std::function<absl::Status(
-    int env, const TransitionView& transition, const FirstJudgement& judgement,
-    const std::optional<EpisodeEnd>& end)>;
+using NextActionSink =
+    std::function<absl::Status(int env, const TransitionView& transition, const FirstJudgement& judgement,
+                               const std::optional<EpisodeEnd>& end)>;
 
 // Holds the newest transition of each environment back until the action after it is known: the action of the
 // environment's next transition. After a true terminal it is zeros. Where an episode is cut, the caller gives

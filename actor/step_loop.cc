@@ -91,8 +91,7 @@ void StepLoop::JudgeCuts(const PolicyNetworks& policy) {
 absl::Status StepLoop::ActAtCuts(const PolicyNetworks& policy) {
   if (cuts_.empty()) return absl::OkStatus();
   drawn_at_cuts_.resize(actions_.rows(), static_cast<Eigen::Index>(cuts_.size()));
-  RETURN_IF_ERROR(
-      runner_.Act(policy, options_.mode, cut_observations_, cut_masks_, rng_, drawn_at_cuts_));
+  RETURN_IF_ERROR(runner_.Act(policy, options_.mode, cut_observations_, cut_masks_, rng_, drawn_at_cuts_));
   cut_actions_(Eigen::all, cuts_) = drawn_at_cuts_;
   return absl::OkStatus();
 }
@@ -121,8 +120,8 @@ absl::Status StepLoop::Emit(int i, std::uint64_t critic_version) {
   if (returns_.has_value()) {
     RETURN_IF_ERROR(returns_->Add(i, transition, {advantages_[i], next_values_[i], critic_version}, end));
   } else if (next_actions_.has_value()) {
-    RETURN_IF_ERROR(next_actions_->Add(i, transition, {advantages_[i], critic_version}, end,
-                                       Column(cut_actions_, i)));
+    RETURN_IF_ERROR(
+        next_actions_->Add(i, transition, {advantages_[i], critic_version}, end, Column(cut_actions_, i)));
   } else {
     RETURN_IF_ERROR(n_step_->Add(i, transition, {advantages_[i], critic_version}, end));
   }

@@ -41,8 +41,8 @@ struct StepCounters {
 // All environments take one step at a time. Ended episodes restart with random seeds drawn from `rng`, so
 // that the same rng and policies give the same transitions. Rewards go out in the environment's units. With
 // returns, an episode's transitions go out together when it has ended (EpisodeReturns). With next actions a
-// transition goes out a step later (NextActions). With n_step > 1 it goes out n_step - 1 steps later, or when its episode has ended (NStepTransitions). Owns its
-// environments. One thread at a time.
+// transition goes out a step later (NextActions). With n_step > 1 it goes out n_step - 1 steps later, or when
+// its episode has ended (NStepTransitions). Owns its environments. One thread at a time.
 class StepLoop {
  public:
   StepLoop(std::unique_ptr<VectorEnv> envs, const StepLoopOptions& options, const Rng& rng,
@@ -54,8 +54,8 @@ class StepLoop {
   absl::Status Step(const PolicyNetworks& policy);
 
   // Lets go of the transitions that wait for further steps: they go out with fewer steps, and continue with
-  // the state that their environment is in. Those that wait for their returns or next actions stay. Blocks as the sink does
-  // and returns the sink's first error. Call it after the last step.
+  // the state that their environment is in. Those that wait for their returns or next actions stay. Blocks as
+  // the sink does and returns the sink's first error. Call it after the last step.
   absl::Status Flush() { return n_step_->Flush(); }
 
   const StepCounters& counters() const { return counters_; }

@@ -39,8 +39,8 @@ inline constexpr char kObservationNormalizer[] = "observation_normalizer";
 
 // Plain values. A snapshot does not change once it is published: processes share it by pointer.
 struct PolicySnapshot {
-  std::uint64_t version = 0;  // counts pushes, from 1
-  std::uint64_t updates = 0;  // updates of the learner behind it
+  std::uint64_t version = 0;        // counts pushes, from 1
+  std::uint64_t updates = 0;        // updates of the learner behind it
   bool ends_offline_phase = false;  // the learner waits for an evaluation of it; not in files
   PolicySpec spec;
   float support_epsilon = 0.05f;  // the eps of the acting mode SUPPORT

@@ -46,9 +46,9 @@ struct OptionalColumns {
 // Replay servers, writers and readers of one run have the same layout, and refuse another.
 struct TransitionLayout {
   int observation_width = 0;
-  int action_width = 0;  // 1 for a discrete action
-  int mask_width = 0;    // number of discrete actions; 0 for a continuous space
-  int return_width = 0;  // 1 where transitions carry their Monte-Carlo return, else 0
+  int action_width = 0;       // 1 for a discrete action
+  int mask_width = 0;         // number of discrete actions; 0 for a continuous space
+  int return_width = 0;       // 1 where transitions carry their Monte-Carlo return, else 0
   int next_action_width = 0;  // action_width where transitions carry their next action, else 0
 
   // `optional`: as OptionalColumnsOf (proto/config/config_file.h) says of the run's config.

@@ -104,14 +104,14 @@ absl::StatusOr<RunStore> OpenRunStore(const std::string& run) {
   }
   ASSIGN_OR_RETURN(const std::unique_ptr<Env> env, MakeEnv(TrainingEnv(config.env())));
   RunStore opened{.env = env->spec(), .store = nullptr};
-  ASSIGN_OR_RETURN(
-      opened.store,
-      TransitionStore::Open({.path = folder.replay_store(),
-                             .env = env->spec().name,
-                             .layout = TransitionLayout::Of(env->spec(), OptionalColumnsOf(config.algorithm())),
-                             .capacity = config.replay().capacity(),
-                             .byte_budget = config.replay().byte_budget(),
-                             .resume = true}));
+  ASSIGN_OR_RETURN(opened.store,
+                   TransitionStore::Open(
+                       {.path = folder.replay_store(),
+                        .env = env->spec().name,
+                        .layout = TransitionLayout::Of(env->spec(), OptionalColumnsOf(config.algorithm())),
+                        .capacity = config.replay().capacity(),
+                        .byte_budget = config.replay().byte_budget(),
+                        .resume = true}));
   return opened;
 }
 

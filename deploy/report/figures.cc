@@ -42,7 +42,8 @@ std::string GroupOf(const Task& task) {
   if (task.kind() == Task::GAMES) return "games";
   const std::size_t dash = task.name().rfind('-');
   return absl::StrCat(
-      task.kind() == Task::FINETUNE ? "fine-tuned" : "offline", dash == std::string::npos ? "" : absl::StrCat(", ", task.name().substr(dash + 1), " data"));
+      task.kind() == Task::FINETUNE ? "fine-tuned" : "offline",
+      dash == std::string::npos ? "" : absl::StrCat(", ", task.name().substr(dash + 1), " data"));
 }
 
 std::optional<Estimate> EstimateOf(const Published* published) {

@@ -17,11 +17,8 @@ class ActorCriticAlgorithm {
  public:
   BatchNeeds needs() const { return networks_.needs(); }
   // Of networks that have such values.
-  void SetControls(const UpdateControls& controls)
-    requires requires(Networks networks) { networks.controls; }
-  {
-    networks_.controls = controls;
-  }
+  void SetControls(const UpdateControls& controls) requires requires(Networks networks) { networks.controls; }
+  { networks_.controls = controls; }
   const std::vector<float>& advantages() const { return networks_.advantages; }
   const std::vector<UpdateMetric>& metrics() const { return metrics_; }
   void ExportPolicy(PolicySnapshot* snapshot) const { networks_.Export(snapshot); }

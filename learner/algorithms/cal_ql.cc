@@ -79,9 +79,8 @@ template <class Scalar>
 SoftPolicyLoss<Scalar> CalQl<Scalar>::ImprovePolicy(const BasicBatch<Scalar>& batch) {
   const Eigen::Index n = batch.size();
   FillNormal(networks_.rng, networks_.spec.actions.size, n, &noise_);
-  const SoftPolicyLoss<Scalar> loss =
-      objective_.Compute(head_, batch.observations, noise_, networks_.temperature.value(),
-                         &networks_.critics, &d_output_);
+  const SoftPolicyLoss<Scalar> loss = objective_.Compute(
+      head_, batch.observations, noise_, networks_.temperature.value(), &networks_.critics, &d_output_);
   networks_.policy.Step(batch.observations, d_output_);
   value_.resize(n);
   MeanOfSmaller<Scalar>(networks_.critics.value1(), networks_.critics.value2(), &value_);

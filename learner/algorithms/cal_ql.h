@@ -1,6 +1,6 @@
 // Calibrated Q-Learning over continuous actions (Nakamoto et al. 2023, "Cal-QL: Calibrated Offline RL
-// Pre-Training for Efficient Online Fine-Tuning"), on conservative Q-learning (Kumar et al. 2020, "Conservative
-// Q-Learning for Offline Reinforcement Learning").
+// Pre-Training for Efficient Online Fine-Tuning"), on conservative Q-learning (Kumar et al. 2020,
+// "Conservative Q-Learning for Offline Reinforcement Learning").
 #pragma once
 
 #include <memory>
@@ -15,8 +15,8 @@
 
 namespace dbr {
 
-// State: a policy pi, twin critics with targets and a temperature. One thread at a time. One update on a batch
-// B drawn uniformly from D:
+// State: a policy pi, twin critics with targets and a temperature. One thread at a time. One update on a
+// batch B drawn uniformly from D:
 //   1. y = r + discount * min_i Q'_i(s', a'), where a' is drawn from pi.
 //   2. Each critic regresses on y, and is pushed down at conservative_actions draws of each of three sources
 //      (uniform, pi at s, pi at s', all evaluated at s) and up at the data's action

@@ -41,9 +41,7 @@ struct DualBehaviorNetworks : ActorCritic<Scalar> {
   BatchNeeds needs() const { return DualBehaviorNeeds(this->spec.config); }
 
   // The multiplier of the divergence. It is 0 where there is no constraint.
-  Scalar alpha() const {
-    return constrained ? Given(controls.multiplier, multiplier.value()) : Scalar{0};
-  }
+  Scalar alpha() const { return constrained ? Given(controls.multiplier, multiplier.value()) : Scalar{0}; }
 
   // The weight of the policy's entropy in the values: the temperature, or 0 where there is none.
   Scalar tau() const { return soft ? Given(controls.temperature, temperature.value()) : Scalar{0}; }

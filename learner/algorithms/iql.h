@@ -17,12 +17,13 @@ namespace dbr {
 //   1. A = min_i Q'_i(s, a) - V(s) for every transition.
 //   2. V minimises E[|expectile - 1(A < 0)| A^2] (equation 5).
 //   3. y = r + discount * V(s'). Each critic regresses on y (equation 6).
-//   4. pi maximises E[w log pi(a|s)] over B (equation 7). The weight w = min(exp(A / temperature), max_weight)
+//   4. pi maximises E[w log pi(a|s)] over B (equation 7). The weight w = min(exp(A / temperature),
+//   max_weight)
 //      is a constant.
 //   5. Polyak averaging of the critics, and of pi: evaluations play the average.
-// No action but the data's is ever evaluated. Departures from the paper: steps 3 and 4 take V from before step
-// 2, so that nothing is computed twice. pi is a tanh-Gaussian whose log-std depends on the state and is clipped
-// to [-5, 2] while it is trained, as AWAC's (learner/algorithms/awac.h).
+// No action but the data's is ever evaluated. Departures from the paper: steps 3 and 4 take V from before
+// step 2, so that nothing is computed twice. pi is a tanh-Gaussian whose log-std depends on the state and is
+// clipped to [-5, 2] while it is trained, as AWAC's (learner/algorithms/awac.h).
 template <class Scalar>
 class Iql : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
  public:
@@ -49,7 +50,7 @@ class Iql : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
 
   GaussianLikelihood<Scalar> pi_{kBehaviorLogStd};
   CriticRegression<Scalar> regression_;
-  MatrixX<Scalar> inputs_, d_value_;                               // [observation + dimensions x n], [1 x n]
+  MatrixX<Scalar> inputs_, d_value_;  // [observation + dimensions x n], [1 x n]
   VectorX<Scalar> target_value_, advantage_, next_value_, weights_;  // [n]; target_value_ is min_i Q'_i(s, a)
 };
 

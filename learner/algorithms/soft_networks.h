@@ -44,13 +44,14 @@ struct SoftNetworks : ActorCritic<Scalar> {
             {"train/advantage_mean"}, {"train/advantage_positive"}, {"train/advantage_std"}};
   }
 
-  // Sets `metrics`: Metrics(), and behind them an algorithm's own. Returns Internal where a value is not finite.
+  // Sets `metrics`: Metrics(), and behind them an algorithm's own. Returns Internal where a value is not
+  // finite.
   absl::Status Report(Scalar critic_loss, const SoftPolicyLoss<Scalar>& loss, Scalar target_mean,
                       std::vector<UpdateMetric>* metrics, absl::Span<const double> own = {}) const {
     const AdvantageFigures figures = FiguresOf(this->advantages);
-    absl::InlinedVector<double, 16> values = {critic_loss,  loss.loss,   temperature.value(), loss.entropy,
-                                              loss.value,   target_mean, figures.mean,        figures.positive,
-                                              figures.deviation};
+    absl::InlinedVector<double, 16> values = {critic_loss,  loss.loss,        temperature.value(),
+                                              loss.entropy, loss.value,       target_mean,
+                                              figures.mean, figures.positive, figures.deviation};
     values.insert(values.end(), own.begin(), own.end());
     return SetMetrics(values, this->updates, metrics);
   }

@@ -30,8 +30,8 @@ absl::Status Td3<Scalar>::Update(const BasicBatch<Scalar>& uniform, const BasicB
   const Scalar policy_loss = ImprovePolicy(uniform);
   ++networks_.updates;
   const AdvantageFigures advantages = FiguresOf(networks_.advantages);
-  return SetMetrics({critic_loss, policy_loss, objective_.distance(), value_.mean(), regression_.target().mean(), advantages.mean,
-                     advantages.positive, advantages.deviation},
+  return SetMetrics({critic_loss, policy_loss, objective_.distance(), value_.mean(),
+                     regression_.target().mean(), advantages.mean, advantages.positive, advantages.deviation},
                     networks_.updates, &metrics_);
 }
 

@@ -29,9 +29,10 @@ namespace dbr {
 //      actions a, ReBRAC -E[Q_1] / E|Q_1| + policy_penalty * E[|pi(s) - a|^2].
 //   3. A = Q(s, a) - V(s) for every transition of B. Q is the smaller twin before its step, and V is the
 //      smaller twin at pi(s) before step 2's step.
-// Departures from the papers: of policy_delay updates the first one moves the policy, not the last. The actors
-// add the exploration noise (actor.mode MODE with actor.action_noise). ReBRAC's code takes the smaller twin in
-// step 2. Its deeper critics, larger batches and layer norm are settings of network and algorithm here.
+// Departures from the papers: of policy_delay updates the first one moves the policy, not the last. The
+// actors add the exploration noise (actor.mode MODE with actor.action_noise). ReBRAC's code takes the smaller
+// twin in step 2. Its deeper critics, larger batches and layer norm are settings of network and algorithm
+// here.
 template <class Scalar>
 class Td3 : public ActorCriticAlgorithm<ActorCritic<Scalar>> {
  public:

@@ -15,8 +15,8 @@ namespace dbr {
 // draw k of state j in column k * n + j.
 template <class Scalar>
 struct ConservativeDraws {
-  MatrixX<Scalar> actions;   // [dimensions x count * n]
-  VectorX<Scalar> log_prob;  // [count * n] the density with which each was drawn
+  MatrixX<Scalar> actions;     // [dimensions x count * n]
+  VectorX<Scalar> log_prob;    // [count * n] the density with which each was drawn
   Eigen::Index unbounded = 0;  // the first columns, whose Q the returns do not bound from below
 };
 
@@ -28,10 +28,11 @@ struct ConservativeTerm {
 
 // Returns the mean over n states of
 //   (q_j - y_j)^2 + weight * (log sum_k exp(Q_jk) / p_jk - q_j)
-// where q_j is the critic at the data's action of state j, Q_jk at its draw k and p_jk the draw's density (Kumar
-// et al. 2020, equation 4, with the importance weights of their appendix F). Calibrated, Q_jk counts as at least
-// `floor`_j where draw k is a policy's (Nakamoto et al. 2023, equation 5.1). q [1 x n + count * n] holds the
-// data's n columns first. Sets `d_q` to the gradient with respect to q. y [n], floor [n] and p are constants.
+// where q_j is the critic at the data's action of state j, Q_jk at its draw k and p_jk the draw's density
+// (Kumar et al. 2020, equation 4, with the importance weights of their appendix F). Calibrated, Q_jk counts
+// as at least `floor`_j where draw k is a policy's (Nakamoto et al. 2023, equation 5.1). q [1 x n + count *
+// n] holds the data's n columns first. Sets `d_q` to the gradient with respect to q. y [n], floor [n] and p
+// are constants.
 template <class Scalar>
 Scalar ConservativeLoss(const MatrixX<Scalar>& q, const VectorX<Scalar>& y, const VectorX<Scalar>& floor,
                         const ConservativeDraws<Scalar>& draws, const ConservativeTerm<Scalar>& term,
@@ -65,9 +66,9 @@ Scalar ConservativeLoss(const MatrixX<Scalar>& q, const VectorX<Scalar>& y, cons
 template <class Scalar>
 class ConservativeRegression {
  public:
-  // Makes one step of all critics on ConservativeLoss with y = reward_scale * r + discount * V'(s') and the floor
-  // reward_scale * R. next_value [n] is V'(s'). Returns the mean of the critics' losses. Requires returns where
-  // calibrated. The batch must not be empty.
+  // Makes one step of all critics on ConservativeLoss with y = reward_scale * r + discount * V'(s') and the
+  // floor reward_scale * R. next_value [n] is V'(s'). Returns the mean of the critics' losses. Requires
+  // returns where calibrated. The batch must not be empty.
   Scalar Fit(const BasicBatch<Scalar>& batch, double reward_scale, const VectorX<Scalar>& next_value,
              const ConservativeDraws<Scalar>& draws, const ConservativeTerm<Scalar>& term,
              CriticEnsemble<Scalar>* critics) {

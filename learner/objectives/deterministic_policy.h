@@ -52,8 +52,8 @@ struct DeterministicPolicyTerms {
 template <class Scalar>
 class DeterministicPolicyObjective {
  public:
-  // Returns -w E[Q_1(s, tanh(mean(s)))] / scale + penalty * E[|tanh(mean(s)) - a|^2], w = q_weight (Fujimoto et
-  // al. 2018, algorithm 1; with the data's actions a: Fujimoto, Gu 2021, equation 3; Tarasov et al. 2023,
+  // Returns -w E[Q_1(s, tanh(mean(s)))] / scale + penalty * E[|tanh(mean(s)) - a|^2], w = q_weight (Fujimoto
+  // et al. 2018, algorithm 1; with the data's actions a: Fujimoto, Gu 2021, equation 3; Tarasov et al. 2023,
   // equation 3). The scale is the mean of |Q_1| with normalize_q, else 1, and a constant. Both twins are
   // evaluated: value1() and value2() of `critics` are then their values at the policy's actions.
   Scalar Evaluate(const DeterministicPolicyTerms& terms, const GaussianHead<Scalar>& pi,

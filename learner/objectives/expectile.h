@@ -7,8 +7,8 @@
 
 namespace dbr {
 
-// Returns the mean of |expectile - 1(u < 0)| u^2 with u = q - v (Kostrikov, Nair, Levine 2021, equation 5). Sets
-// `d_v` [1 x n] to its gradient with respect to v [1 x n]. q [n] is a constant.
+// Returns the mean of |expectile - 1(u < 0)| u^2 with u = q - v (Kostrikov, Nair, Levine 2021, equation 5).
+// Sets `d_v` [1 x n] to its gradient with respect to v [1 x n]. q [n] is a constant.
 template <class Scalar>
 Scalar ExpectileError(const MatrixX<Scalar>& v, const VectorX<Scalar>& q, double expectile,
                       MatrixX<Scalar>* d_v) {

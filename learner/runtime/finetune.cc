@@ -55,15 +55,15 @@ void Finetune::Decide(std::uint64_t updates, double offline_return) {
 
 std::string Finetune::Text() const {
   if (!decided_.has_value()) return "";
-  const std::string returns = absl::StrFormat("the offline policy has a mean return of %.1f", offline_return_);
-  const std::string of_seed =
-      std::isfinite(seed_buffer_return_)
-          ? absl::StrFormat(", the seed buffer %.1f", seed_buffer_return_)
-          : std::string(", the seed buffer has no whole episode");
-  const std::string way =
-      *decided_ == FinetuneConfig::RETAIN
-          ? absl::StrFormat("RETAIN, the seed buffer keeps %.0f%% of each draw", 100 * config_.retained_share())
-          : std::string("WARM_START, the seed buffer is left behind");
+  const std::string returns =
+      absl::StrFormat("the offline policy has a mean return of %.1f", offline_return_);
+  const std::string of_seed = std::isfinite(seed_buffer_return_)
+                                  ? absl::StrFormat(", the seed buffer %.1f", seed_buffer_return_)
+                                  : std::string(", the seed buffer has no whole episode");
+  const std::string way = *decided_ == FinetuneConfig::RETAIN
+                              ? absl::StrFormat("RETAIN, the seed buffer keeps %.0f%% of each draw",
+                                                100 * config_.retained_share())
+                              : std::string("WARM_START, the seed buffer is left behind");
   return absl::StrCat("fine-tuning: ", returns, of_seed, ": ", way, "; the next update comes after ",
                       config_.first_transitions(), " transitions");
 }
@@ -91,9 +91,10 @@ UpdateControls Finetune::ControlsAt(std::uint64_t updates) {
       report->return_mean() < GuardedReturn()) {
     begun_ = updates;
     ++begun_anew_;
-    spdlog::warn("the evaluated return {:.1f} is below {:.1f}, {} times the offline policy's: the schedules "
-                 "begin anew at update {}",
-                 report->return_mean(), GuardedReturn(), config_.guard_share(), updates);
+    spdlog::warn(
+        "the evaluated return {:.1f} is below {:.1f}, {} times the offline policy's: the schedules "
+        "begin anew at update {}",
+        report->return_mean(), GuardedReturn(), config_.guard_share(), updates);
   }
   return {.multiplier = Geometric(config_.multiplier()),
           .temperature = Geometric(config_.temperature()),

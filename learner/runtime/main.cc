@@ -79,15 +79,16 @@ absl::Status Resume(const RunFolder& folder, const LearnerConfig& config, Traine
 }
 
 // Labels that the replay has may be newer than what `trainer` goes on from, and it refuses older ones: no
-// training before it has told of them. It also tells what the seed buffer's episodes returned. Blocks until then,
-// or until a signal has stopped the trainer.
+// training before it has told of them. It also tells what the seed buffer's episodes returned. Blocks until
+// then, or until a signal has stopped the trainer.
 absl::Status AskReplay(ReplayClient* replay, Trainer* trainer, Finetune* finetune) {
   StopFlag stopping;
   const ShutdownWatcher watcher([&] {
     stopping.Set();
     trainer->Stop();
   });
-  const absl::StatusOr<StatsReply> stats = AwaitStats(replay, "to hear of its newest labels and its seed buffer", stopping);
+  const absl::StatusOr<StatsReply> stats =
+      AwaitStats(replay, "to hear of its newest labels and its seed buffer", stopping);
   if (stopping.IsSet()) return absl::OkStatus();
   RETURN_IF_ERROR(stats.status());
   trainer->StartVersionsAfter(stats->newest_critic_version());
@@ -108,9 +109,9 @@ void WriteEvaluation(const EvaluationReport& report, MetricsSink* metrics) {
 
 std::unique_ptr<Prefetcher> MakePrefetcher(const Config& config, const AlgorithmSpec& spec,
                                            const BatchNeeds& needs, ReplayClient* draws) {
-  const TransitionLayout layout =
-      TransitionLayout::Of({.name = spec.env, .observation_size = spec.observation_size, .actions = spec.actions},
-                           OptionalColumnsOf(config.algorithm()));
+  const TransitionLayout layout = TransitionLayout::Of(
+      {.name = spec.env, .observation_size = spec.observation_size, .actions = spec.actions},
+      OptionalColumnsOf(config.algorithm()));
   return std::make_unique<Prefetcher>(
       draws, PrefetcherOptions{.counts = {needs.uniform, needs.plus, needs.minus},
                                .layout = layout,
@@ -133,14 +134,16 @@ absl::Status Serve(const Arguments& arguments, const Config& config) {
   ReplayClient draws(arguments.replay_address), labels(arguments.replay_address),
       stats(arguments.replay_address);
   const BatchNeeds needs = algorithm->needs();
-  TrainerParts parts{.algorithm = std::move(algorithm),
-                     .matrix_products = KernelsName(spec.bfloat16),
-                     .policy_service = &service,
-                     .metrics = metrics.get(),
-                     .saver = &saver,
-                     .prefetcher = MakePrefetcher(config, spec, needs, &draws),
-                     .relabeller = std::make_unique<Relabeller>(&labels),
-                     .finetune = &finetune,};
+  TrainerParts parts{
+      .algorithm = std::move(algorithm),
+      .matrix_products = KernelsName(spec.bfloat16),
+      .policy_service = &service,
+      .metrics = metrics.get(),
+      .saver = &saver,
+      .prefetcher = MakePrefetcher(config, spec, needs, &draws),
+      .relabeller = std::make_unique<Relabeller>(&labels),
+      .finetune = &finetune,
+  };
   Trainer trainer(learner, std::move(parts));
   if (arguments.resume) RETURN_IF_ERROR(Resume(arguments.folder, learner, &trainer));
   RETURN_IF_ERROR(metrics->StartSession(static_cast<std::int64_t>(trainer.updates()), absl::Now()));

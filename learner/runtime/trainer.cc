@@ -76,7 +76,8 @@ absl::Status Trainer::Save() {
 
 Trainer::End Trainer::UpdateToTheEnd() {
   while (config_.max_updates() == 0 || updates_ < config_.max_updates()) {
-    if (parts_.finetune->IsBetweenPhases(updates_) && !PassBetweenPhases()) return {.status = absl::OkStatus()};
+    if (parts_.finetune->IsBetweenPhases(updates_) && !PassBetweenPhases())
+      return {.status = absl::OkStatus()};
     absl::StatusOr<std::unique_ptr<DrawnBatches>> drawn = parts_.prefetcher->Next();
     if (!drawn.ok()) return {.status = Stopping() ? absl::OkStatus() : drawn.status()};
     const absl::Status updated = Update(*std::move(drawn));
@@ -86,7 +87,8 @@ Trainer::End Trainer::UpdateToTheEnd() {
 }
 
 bool Trainer::PassBetweenPhases() {
-  spdlog::info("the offline phase is over after {} updates: waiting for an evaluation of its policy", updates_);
+  spdlog::info("the offline phase is over after {} updates: waiting for an evaluation of its policy",
+               updates_);
   snapshot_.ends_offline_phase = true;
   Publish();
   snapshot_.ends_offline_phase = false;

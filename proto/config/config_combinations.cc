@@ -94,8 +94,8 @@ void CheckSchedule(const Config& config, const char* name, const ScheduleConfig&
                                    "schedule would end before it begins"));
   }
   if (positive && (schedule.first() <= 0 || schedule.last() <= 0)) {
-    errors->push_back(absl::StrCat(field, ": expected first and last above 0, found ", schedule.first(), " and ",
-                                   schedule.last()));
+    errors->push_back(absl::StrCat(field, ": expected first and last above 0, found ", schedule.first(),
+                                   " and ", schedule.last()));
   }
   if (!config.algorithm().has_dbr()) {
     errors->push_back(absl::StrCat(field, ": expected algorithm dbr with it, which alone has schedules"));
@@ -140,7 +140,8 @@ void CheckFinetune(const Config& config, std::vector<std::string>* errors) {
   CheckSchedule(config, "target_entropy", finetune.target_entropy(), /*positive=*/false, errors);
   if (IsGiven(finetune.temperature()) && IsGiven(finetune.target_entropy())) {
     errors->emplace_back(
-        "finetune.target_entropy: expected none with finetune.temperature, which is then not learned, found both");
+        "finetune.target_entropy: expected none with finetune.temperature, which is then not learned, found "
+        "both");
   }
 }
 

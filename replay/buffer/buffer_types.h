@@ -66,9 +66,9 @@ struct WriterProgress {
 
 struct DrawRequest {
   std::array<std::uint32_t, kDrawnParts> counts{};  // rows from D, D+, D-
-  bool allow_empty_partitions = false;  // an empty partition gives no rows; else the draw waits for one
+  bool allow_empty_partitions = false;      // an empty partition gives no rows; else the draw waits for one
   std::optional<double> seed_buffer_share;  // in place of the options'; 0 draws none where there are others
-  std::uint64_t first_transitions = 0;  // waits until so many beside the seed buffer have been inserted
+  std::uint64_t first_transitions = 0;      // waits until so many beside the seed buffer have been inserted
 };
 
 // Room for the asked counts from D, D+ and D-; the caller owns the memory.

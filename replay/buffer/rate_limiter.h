@@ -23,8 +23,8 @@ struct RateLimiterOptions {
 // on.
 //
 // The rows of the seed buffer count as neither inserted nor sampled: `minimum` is min_size less their number,
-// at least 0. While there are no others, draws are free and are not counted. CountFrom raises `minimum`, and no
-// draw is made before it.
+// at least 0. While there are no others, draws are free and are not counted. CountFrom raises `minimum`, and
+// no draw is made before it.
 //
 // Plain arithmetic without clock or lock. Thread-compatible: the buffer's mutex guards it.
 class RateLimiter {

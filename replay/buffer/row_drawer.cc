@@ -18,8 +18,7 @@ void RowDrawer::ChooseSlots(int part, std::uint32_t count, std::optional<double>
     return;
   }
   // The expected number of seed buffer rows is exact: what is left of a whole number is drawn by chance.
-  const auto of_seed_buffer =
-      static_cast<std::size_t>(*share * count + rng_.Uniform());
+  const auto of_seed_buffer = static_cast<std::size_t>(*share * count + rng_.Uniform());
   for (std::size_t i = 0; i < count; ++i) {
     slots_[i] = i < of_seed_buffer ? members.DrawSeedBuffer(&rng_) : members.DrawOther(&rng_);
   }

@@ -14,8 +14,8 @@ namespace dbr {
 
 // Hands out a reader's transitions, each with the action of the transition that follows it, or with zeros
 // after a true terminal. Where nothing follows (a cut episode, a gap of rows that were left out, a row whose
-// observation is another than the next observation before it, the end of the file) the file cannot say what would have been done: that transition is left out. Holds one chunk in
-// memory. One thread at a time.
+// observation is another than the next observation before it, the end of the file) the file cannot say what
+// would have been done: that transition is left out. Holds one chunk in memory. One thread at a time.
 class NextActionReader {
  public:
   // `reader`, from which nothing was read, outlives this.
@@ -41,13 +41,13 @@ class NextActionReader {
 
   DatasetReader* const reader_;
   const TransitionLayout layout_;
-  TransitionChunk chunk_;               // without next actions
-  std::vector<float> waiting_;          // [stride] the newest row, as layout_ lays it
-  bool waits_ = false;                  // whether there is one
-  bool waiting_starts_ = false;         // whether it starts a stretch
-  std::vector<float> rows_;             // of the newest Next()
-  std::vector<std::uint8_t> starts_;    // of these rows
-  const std::vector<float> nothing_;    // [action width] zeros
+  TransitionChunk chunk_;             // without next actions
+  std::vector<float> waiting_;        // [stride] the newest row, as layout_ lays it
+  bool waits_ = false;                // whether there is one
+  bool waiting_starts_ = false;       // whether it starts a stretch
+  std::vector<float> rows_;           // of the newest Next()
+  std::vector<std::uint8_t> starts_;  // of these rows
+  const std::vector<float> nothing_;  // [action width] zeros
 };
 
 }  // namespace dbr

@@ -82,8 +82,8 @@ SeedBufferRecord RecordOf(const DatasetFacts& facts, absl::Duration elapsed) {
           .actions_outside = static_cast<std::uint64_t>(facts.actions_outside)};
 }
 
-// The file's rows [n x stride], as the buffer lays them: with returns or next actions where it wants them, and
-// of up to options.n_step steps.
+// The file's rows [n x stride], as the buffer lays them: with returns or next actions where it wants them,
+// and of up to options.n_step steps.
 class SeedBufferRows {
  public:
   // `reader` outlives this.

@@ -58,12 +58,11 @@ Header MakeHeader(const StoreShape& shape) {
 }
 
 std::string Describe(const Header& header) {
-  return absl::StrCat("environment '", absl::string_view(header.env, strnlen(header.env, sizeof header.env)),
-                      "', widths ", header.observation_width, "/", header.action_width, "/",
-                      header.mask_width, " (observation/action/mask), ",
-                      header.return_width > 0 ? "with" : "without", " returns, ",
-                      header.next_action_width > 0 ? "with" : "without", " next actions, capacity ",
-                      header.capacity);
+  return absl::StrCat(
+      "environment '", absl::string_view(header.env, strnlen(header.env, sizeof header.env)), "', widths ",
+      header.observation_width, "/", header.action_width, "/", header.mask_width,
+      " (observation/action/mask), ", header.return_width > 0 ? "with" : "without", " returns, ",
+      header.next_action_width > 0 ? "with" : "without", " next actions, capacity ", header.capacity);
 }
 
 absl::Status CheckHeader(const std::string& path, const Header& expected, const Header& found,
@@ -84,8 +83,7 @@ absl::Status CheckHeader(const std::string& path, const Header& expected, const 
   }
   if (std::memcmp(&expected, &found, offsetof(Header, total_bytes)) != 0 ||
       std::memcmp(expected.env, found.env, sizeof found.env) != 0 ||
-      expected.return_width != found.return_width ||
-      expected.next_action_width != found.next_action_width) {
+      expected.return_width != found.return_width || expected.next_action_width != found.next_action_width) {
     return absl::FailedPreconditionError(absl::StrCat(
         "replay store ", path, " was made for another set-up: expected ", Describe(expected), "; found ",
         Describe(found), ". Resume with the run's own config, or start in a new folder."));

@@ -173,8 +173,9 @@ TEST(StepLoopTest, WithReturnsEpisodesGoOutWholeAndBootstrapByTheCriticWhereThey
   constexpr double kDiscount = 0.8, kScale = 2;
   const auto policy = UntrainedPolicy(LineEnv().spec(), 5);
   std::vector<Seen> seen;
-  StepLoop loop(MakeLines(kEnvs), {.discount = kDiscount, .columns = {.returns = true}, .reward_scale = kScale},
-                Rng(1), Into(&seen));
+  StepLoop loop(MakeLines(kEnvs),
+                {.discount = kDiscount, .columns = {.returns = true}, .reward_scale = kScale}, Rng(1),
+                Into(&seen));
   for (int step = 0; step < kSteps; ++step) ASSERT_TRUE(loop.Step(*policy).ok());
   EXPECT_EQ(loop.counters().transitions, seen.size() + loop.held_back());
   EXPECT_LE(loop.held_back(), static_cast<std::uint64_t>(kEnvs * LineEnv().spec().max_episode_steps));

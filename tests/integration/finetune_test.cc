@@ -166,9 +166,10 @@ TEST_F(FinetuneTest, ADesignedRunGoesOnInThePhaseInWhichItWasStopped) {
   EXPECT_EQ(offline.Wait(), 130) << offline.output();
   EXPECT_THAT(offline.output(), Not(HasSubstr("fine-tuning:")));
 
-  const std::vector<std::string> resume = {"launch", "--resume", "--run-dir", run_.root,
-                                           "--set", "learner.offline_updates=200",
-                                           "--set", "launch.max_steps=100000"};
+  const std::vector<std::string> resume = {"launch",    "--resume",
+                                           "--run-dir", run_.root,
+                                           "--set",     "learner.offline_updates=200",
+                                           "--set",     "launch.max_steps=100000"};
   DbrProcess online("dbr", resume);
   ASSERT_TRUE(online.Await([&] { return Counter(run_, "inserted") > 1000; })) << online.output();
   online.Signal(SIGINT);
@@ -177,9 +178,9 @@ TEST_F(FinetuneTest, ADesignedRunGoesOnInThePhaseInWhichItWasStopped) {
   const Json first = Summary(run_);
 
   const std::uint64_t steps = first["transitions"].get<std::uint64_t>() + 500;
-  const auto [status, output] = RunProgram(
-      "dbr", {"launch", "--resume", "--run-dir", run_.root, "--set", absl::StrCat("launch.max_steps=", steps),
-              "--set", "learner.offline_updates=200"});
+  const auto [status, output] =
+      RunProgram("dbr", {"launch", "--resume", "--run-dir", run_.root, "--set",
+                         absl::StrCat("launch.max_steps=", steps), "--set", "learner.offline_updates=200"});
   ASSERT_EQ(status, 0) << output;
   EXPECT_THAT(output, HasSubstr("RETAIN, the seed buffer keeps 50% of each draw"));
   EXPECT_THAT(Contents(run_.log("learner")), HasSubstr("resumed from"));

@@ -319,9 +319,10 @@ TEST_F(GridTest, AnOfflineTaskHasASeedBufferAndNoActors) {
 
 TEST_F(GridTest, AFineTuningTaskHasASeedBufferAndActors) {
   const std::pair<std::string, std::string> kind = {"kind: OFFLINE", "kind: FINETUNE"},
-                                            scale = {"scale {\n  name: \"smoke\" seeds: 2",
-                                                     "scale {\n  name: \"smoke\" seeds: 2\n  finetune { learner { "
-                                                     "offline_updates: 5 } launch { max_steps: 8 } }"};
+                                            scale = {
+                                                "scale {\n  name: \"smoke\" seeds: 2",
+                                                "scale {\n  name: \"smoke\" seeds: 2\n  finetune { learner { "
+                                                "offline_updates: 5 } launch { max_steps: 8 } }"};
   const auto grid = MakeCheckedGrid(Changed({kind, scale}), Options());
   ASSERT_TRUE(grid.ok()) << grid.status();
   for (const Cell& cell : grid->cells) {
@@ -329,9 +330,10 @@ TEST_F(GridTest, AFineTuningTaskHasASeedBufferAndActors) {
   }
   EXPECT_THAT(ErrorsOf({kind, scale, {"replay { seed_buffer { path: \"hopper-medium.hdf5\" } }", ""}}),
               Contains(HasSubstr("expected the seed buffer of a fine-tuning task, found none")));
-  EXPECT_THAT(ErrorsOf({kind, scale, {"offline_updates: 5 }", "offline_updates: 5 max_updates: 5 }"}}),
-              Contains(HasSubstr("expected a fine-tuning task to have actors, with learner.max_updates of 0 or "
-                                 "above learner.offline_updates, found 5 and 5")));
+  EXPECT_THAT(
+      ErrorsOf({kind, scale, {"offline_updates: 5 }", "offline_updates: 5 max_updates: 5 }"}}),
+      Contains(HasSubstr("expected a fine-tuning task to have actors, with learner.max_updates of 0 or "
+                         "above learner.offline_updates, found 5 and 5")));
 }
 
 TEST_F(GridTest, EveryRunComesToAnEnd) {

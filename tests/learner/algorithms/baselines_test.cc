@@ -1,4 +1,5 @@
-// Tests BRAC, TD3, TD3+BC, ReBRAC, AWAC, IQL and Cal-QL: what an update changes, and that each solves a bandit with a known optimum.
+// Tests BRAC, TD3, TD3+BC, ReBRAC, AWAC, IQL and Cal-QL: what an update changes, and that each solves a
+// bandit with a known optimum.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -265,8 +266,8 @@ TEST_F(Bandit, Td3FindsTheBestAction) {
 }
 
 TEST_F(Bandit, Td3BcStandsBetweenTheDataAndTheBestAction) {
-  // The data's mean action is 0, the best one 0.4, and Q is about -1.2 between them. The tent's slope of 1, times
-  // q_weight / 1.2, meets the pull's slope of 2 a.
+  // The data's mean action is 0, the best one 0.4, and Q is about -1.2 between them. The tent's slope of 1,
+  // times q_weight / 1.2, meets the pull's slope of 2 a.
   const auto reward = [](float a) { return -std::abs(a - 0.4f) - 1; };
   AlgorithmSpec spec = Spec(AlgorithmConfig::kTd3Bc);
   spec.config.mutable_td3_bc()->set_q_weight(0.5);
@@ -294,8 +295,8 @@ TEST_F(Bandit, TheConservativeTermKeepsThePolicyWhereTheDataIs) {
 }
 
 TEST_F(Bandit, IqlFindsTheExpectileOfTheDatasValues) {
-  // Rewards are uniform in [-0.98, 0.98]. The expectile e of a uniform on [-b, b] is b (sqrt(e) - sqrt(1 - e))
-  // / (sqrt(e) + sqrt(1 - e)).
+  // Rewards are uniform in [-0.98, 0.98]. The expectile e of a uniform on [-b, b] is b (sqrt(e) - sqrt(1 -
+  // e)) / (sqrt(e) + sqrt(1 - e)).
   AlgorithmSpec spec = Spec(AlgorithmConfig::kIql);
   spec.config.mutable_iql()->set_expectile(0.9);
   Train(spec, UniformActions(), [](float a) { return a; });

@@ -26,14 +26,14 @@ inline Symmetry SmallSymmetry(ActionKind actions = ActionKind::kDiscrete) {
           .action = actions == ActionKind::kDiscrete ? std::vector<int>{1, 0, 2} : std::vector<int>{1, 0}};
 }
 
-// Random transitions, with returns and next actions where the algorithm needs them. In a discrete space action 2 is illegal in
-// every third state.
+// Random transitions, with returns and next actions where the algorithm needs them. In a discrete space
+// action 2 is illegal in every third state.
 template <class Scalar>
 BasicBatch<Scalar> RandomBatch(const AlgorithmSpec& spec, int n, Rng& rng) {
   BasicBatch<Scalar> batch;
-  batch.Resize(TransitionLayout::Of({.name = spec.env, .observation_size = spec.observation_size,
-                                     .actions = spec.actions},
-                                    OptionalColumnsOf(spec.config)),
+  batch.Resize(TransitionLayout::Of(
+                   {.name = spec.env, .observation_size = spec.observation_size, .actions = spec.actions},
+                   OptionalColumnsOf(spec.config)),
                n, /*with_keys=*/true);
   const auto draw = [&](Scalar) { return static_cast<Scalar>(2 * rng.Uniform() - 1); };
   batch.observations = batch.observations.unaryExpr(draw).eval();

@@ -229,7 +229,8 @@ TEST_P(Schedule, WhatAPhaseSetsHoldsAndIsNotLearned) {
   dbr()->set_first_temperature(0.5);
   Start();
   Update();
-  const MultiplierState multiplier = StateOf(State(), "log_alpha"), temperature = StateOf(State(), "log_temperature");
+  const MultiplierState multiplier = StateOf(State(), "log_alpha"),
+                        temperature = StateOf(State(), "log_temperature");
   algorithm_->SetControls({.multiplier = 7, .temperature = 0.25});
   for (int i = 0; i < 3; ++i) Update();
   EXPECT_EQ(Metric("train/multiplier"), 7);

@@ -28,10 +28,12 @@ double RandomAction(const KnownProblem& problem, int state, Rng& rng) {
   }
 }
 
-Batch DataOf(const KnownProblem& problem, const OptionalColumns& columns, const MatrixX<float>& masks, Rng& rng) {
+Batch DataOf(const KnownProblem& problem, const OptionalColumns& columns, const MatrixX<float>& masks,
+             Rng& rng) {
   Batch batch;
-  batch.Resize(TransitionLayout::Of({.observation_size = problem.states, .actions = problem.actions}, columns),
-               kRows, /*with_keys=*/false);
+  batch.Resize(
+      TransitionLayout::Of({.observation_size = problem.states, .actions = problem.actions}, columns), kRows,
+      /*with_keys=*/false);
   batch.observations.setZero();
   batch.next_observations.setZero();
   batch.returns.setConstant(-1);  // below the value of every state

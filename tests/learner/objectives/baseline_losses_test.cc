@@ -1,4 +1,5 @@
-// Tests the losses of BRAC, TD3 with its kin, AWAC, IQL and Cal-QL: every gradient against central differences in double.
+// Tests the losses of BRAC, TD3 with its kin, AWAC, IQL and Cal-QL: every gradient against central
+// differences in double.
 #include <gtest/gtest.h>
 
 #include <cmath>

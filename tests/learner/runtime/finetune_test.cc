@@ -17,10 +17,12 @@ using ::testing::HasSubstr;
 
 // 1,000 offline updates, and schedules over 100 and 200 online ones.
 Config ConfigOf(const std::string& mode) {
-  return ParseConfig("learner { offline_updates: 1000 } algorithm { dbr { first_temperature: 0.5 } } finetune { mode: " +
-                     mode +
-                     " retained_share: 0.25 first_transitions: 300 multiplier { first: 100 last: 1 updates: 100 } "
-                     "target_entropy { first: -4 last: -1 updates: 200 } }")
+  return ParseConfig(
+             "learner { offline_updates: 1000 } algorithm { dbr { first_temperature: 0.5 } } finetune { "
+             "mode: " +
+             mode +
+             " retained_share: 0.25 first_transitions: 300 multiplier { first: 100 last: 1 updates: 100 } "
+             "target_entropy { first: -4 last: -1 updates: 200 } }")
       .value();
 }
 

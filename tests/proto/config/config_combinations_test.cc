@@ -150,7 +150,8 @@ TEST(ConfigCombinations, FineTuningNeedsTwoPhasesAndSetsTheShare) {
 }
 
 TEST(ConfigCombinations, ASchedulesFieldsFitTogether) {
-  const auto error = [](const std::string& schedule, const std::string& algorithm = "dbr { first_temperature: 1 }") {
+  const auto error = [](const std::string& schedule,
+                        const std::string& algorithm = "dbr { first_temperature: 1 }") {
     return ErrorOf("learner { offline_updates: 10 } algorithm { " + algorithm + " } finetune { mode: AUTO " +
                    schedule + " }");
   };

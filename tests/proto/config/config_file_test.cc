@@ -261,7 +261,9 @@ TEST(OptionalColumnsOfTest, ReturnsAreForSelfImitationAndTheFloorOfQ) {
 }
 
 TEST(OptionalColumnsOfTest, NextActionsAreForThePenaltyOfTheTarget) {
-  const auto next_actions = [](const char* text) { return OptionalColumnsOf(Parsed(text).algorithm()).next_actions; };
+  const auto next_actions = [](const char* text) {
+    return OptionalColumnsOf(Parsed(text).algorithm()).next_actions;
+  };
   EXPECT_FALSE(next_actions(""));
   EXPECT_FALSE(next_actions("algorithm { td3_bc {} }"));
   EXPECT_TRUE(next_actions("algorithm { rebrac {} }"));

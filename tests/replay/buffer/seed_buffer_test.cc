@@ -150,8 +150,8 @@ TEST_F(BufferWithSeedBuffer, ADrawMayAskForAShareOfItsOwn) {
   MakeSeeded(60);
   ASSERT_TRUE(Insert(1001, 20, 1).ok());
   const auto draw = [&](double share) {
-    const DrawRequest request{.counts = {1000, 1000, 0}, .allow_empty_partitions = true,
-                              .seed_buffer_share = share};
+    const DrawRequest request{
+        .counts = {1000, 1000, 0}, .allow_empty_partitions = true, .seed_buffer_share = share};
     ASSERT_TRUE(
         buffer_->Draw(request, {uniform_.columns(), plus_.columns(), minus_.columns()}, kNow, &result_).ok());
   };

@@ -36,7 +36,8 @@ class NextActionReaderTest : public ::testing::Test {
       const auto stride = static_cast<std::size_t>(layout.stride());
       for (std::size_t i = 0; i * stride < read->size(); ++i) {
         const TransitionView row = ViewRow(read->data() + i * stride, layout);
-        rows.push_back({row.reward, {row.next_action.begin(), row.next_action.end()}, next_actions.Starts(i)});
+        rows.push_back(
+            {row.reward, {row.next_action.begin(), row.next_action.end()}, next_actions.Starts(i)});
       }
     }
   }

@@ -233,8 +233,9 @@ TEST_F(StoreInAFile, AStoreWithoutTheReturnsThatARunNeedsIsRefusedAndTheOtherWay
   options_.resume = false;
   { Open(); }
   options_.layout = kSmallLayout;
-  EXPECT_THAT(ResumeError().ToString(), HasSubstr("(observation/action/mask), with returns, without next actions, "
-                                                    "capacity 100. "));
+  EXPECT_THAT(ResumeError().ToString(),
+              HasSubstr("(observation/action/mask), with returns, without next actions, "
+                        "capacity 100. "));
 }
 
 TEST_F(StoreInAFile, AStoreWithoutTheNextActionsThatARunNeedsIsRefused) {
