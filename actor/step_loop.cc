@@ -18,8 +18,8 @@ StepLoop::StepLoop(std::unique_ptr<VectorEnv> envs, const StepLoopOptions& optio
                                                  envs_->size(), options.n_step, std::move(sink))),
       actions_(MatrixX<float>::Zero(envs_->spec().actions.width(), envs_->size())),
       advantages_(VectorX<float>::Zero(envs_->size())),
-      next_values_(VectorX<float>::Zero(envs_->size())),
       cut_actions_(MatrixX<float>::Zero(envs_->spec().actions.width(), envs_->size())),
+      next_values_(VectorX<float>::Zero(envs_->size())),
       episodes_(envs_->size()) {
   DBR_CHECK(!options.columns.returns || !options.columns.next_actions);
   const TransitionLayout layout = TransitionLayout::Of(envs_->spec(), options.columns);
